@@ -1,5 +1,5 @@
-// From the mask to one character: FAPU scaling, weights of its blendshapes, deformed mesh. Pure mathematics, thread-bound:
-// one Retargeter per thread; it borrows nothing after construction.
+// From the mask to one character: FAPU scaling, weights of its blendshapes, deformed mesh. Pure mathematics,
+// thread-bound: one Retargeter per thread; it borrows nothing after construction.
 #pragma once
 
 #include <memory>
@@ -11,8 +11,8 @@
 namespace volto::retarget {
 
 struct RetargetOptions {
-  bool mesh = true;      // compute the deformed vertices
-  bool weights = true;   // compute the blendshape weights
+  bool mesh = true;     // compute the deformed vertices
+  bool weights = true;  // compute the blendshape weights
 };
 
 class Retargeter {
@@ -25,8 +25,8 @@ class Retargeter {
   std::size_t vertexCount() const;
   std::size_t blendshapeCount() const;
 
-  // Same input, same output to the bit, apart from the warm start: weights carry over from the frame before. reset() forgets it.
-  // Allocates nothing once `out` has been through it.
+  // Same input, same output to the bit, apart from the warm start: weights carry over from the frame before. reset()
+  // forgets it. Allocates nothing once `out` has been through it.
   void push(const MaskFrame& in, AvatarFrame& out);
   void reset();
 
