@@ -1,0 +1,40 @@
+// Pictures of a baked performance: one per frame, or one sheet of several moments.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "frames/avatar_frame.h"
+#include "rig/rig.h"
+
+namespace volto::cli {
+
+// "frame_000012.obj"
+std::string frameFileName(std::size_t number, const char* extension);
+
+struct PictureOptions {
+  std::filesystem::path path;  // a folder, or the sheet's file
+  std::string view = "front";  // front, three-quarter, side
+  bool sheet = false;          // also when the path ends in .png
+};
+
+class PictureBaker {
+ public:
+  // `frames`: how many will come, so that the moments of a sheet are spread over them. Borrows `rig`. Throws
+  // CommandError.
+  PictureBaker(const PictureOptions& options, const rig::Rig& rig, std::size_t frames);
+  ~PictureBaker();
+
+  // `number` names the file; frames come in order.
+  void frame(std::size_t number, const AvatarFrame& avatar);
+  // Writes the sheet.
+  void finish();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace volto::cli
