@@ -1,0 +1,406 @@
+#include "rig/assets/head/half_mesh.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <unordered_map>
+
+#include "rig/assets/head/skin_field.h"
+
+namespace volto::head {
+namespace {
+
+// Cells of the grid around the left half: columns from the face's midline to the nape's, rows from crown to neck.
+constexpr int kColumns = 14, kRows = 20;
+// Blocks of the grid that are filled with rings: first row and column, last row and column of their outline.
+constexpr int kEyeTop = 3, kEyeBottom = 7, kEyeInner = 3, kEyeOuter = 7;
+constexpr int kMouthTop = 12, kMouthBottom = 14, kMouthOuter = 4;
+constexpr int kNostrilRow = 10, kNostrilColumn = 1;
+constexpr int kEarTop = 4, kEarBottom = 8, kEarFront = 9, kEarBehind = 11;
+
+constexpr double kPi = 3.14159265358979323846;
+
+// Height in front, at the ear and at the nape, and the pitch of the rays in front (degrees) under the chin.
+struct Row {
+  double front, side, behind, pitch;
+};
+constexpr std::array<Row, kRows + 1> kRowTable{{
+    {8.7, 8.7, 8.7, 0},                                   // crown
+    {6.5, 6.2, 5.8, 0},                                   // hair line
+    {4.2, 3.6, 3.0, 0},                                   // forehead
+    {2.10, 1.55, 0.6, 0},                                 // brows: top of the eye block
+    {1.05, 0.60, -0.4, 0},                                // ear block begins
+    {-0.05, -0.55, -1.3, 0},                              // corners of the eyes
+    {-1.0, -1.85, -2.3, 0},     {-1.95, -3.05, -3.3, 0},  // bottom of the eye block
+    {-2.75, -4.35, -4.3, 0},                              // above the tip of the nose, end of the ear block
+    {-3.45, -4.9, -5.0, 0},                               // tip of the nose
+    {-4.08, -5.4, -5.8, 0},                               // nostril
+    {-4.58, -5.8, -6.5, 0},                               // base of the nose
+    {-5.2, -6.2, -7.2, 0},                                // top of the mouth block
+    {-6.7, -6.9, -8.2, 0},                                // corners of the mouth
+    {-8.5, -7.7, -9.2, 0},                                // bottom of the mouth block
+    {-9.9, -8.7, -10.2, 0},                               // chin
+    {-11.0, -9.8, -11.2, 0},                              // bottom of the chin
+    {-11.7, -10.8, -12.2, -25}, {-12.5, -12.0, -13.3, -25}, {-14.8, -14.6, -15.1, 0}, {-17.6, -17.6, -17.6, 0},
+}};
+
+// Columns: angle about the vertical axis in degrees (0 straight ahead), for some rows; rows between are interpolated.
+struct ColumnAngles {
+  int row;
+  std::array<double, kColumns + 1> degrees;
+};
+constexpr std::array<ColumnAngles, 10> kColumnTable{{
+    {0, {0, 9, 18, 27, 37, 48, 59, 71, 83, 95, 107, 119, 139, 159, 180}},
+    {1, {0, 4.5, 9, 14, 19.5, 26, 34, 46, 64, 82, 95, 109, 132, 156, 180}},
+    {3, {0, 3.1, 6.3, 9.6, 14.6, 20.3, 27, 37, 59, 82, 95, 109, 132, 156, 180}},
+    {7, {0, 2.7, 5.6, 9.2, 14.8, 20.8, 28, 38, 58, 82, 95, 109, 132, 156, 180}},
+    {8, {0, 2.2, 4.9, 9.4, 15.5, 22, 30, 40.5, 59, 82, 95, 109, 132, 156, 180}},
+    {9, {0, 2.2, 5.6, 10.2, 16.0, 23, 32, 42, 60, 82, 95, 109, 132, 156, 180}},
+    {10, {0, 1.7, 6.4, 10.6, 16.3, 23.7, 33, 44, 61, 82, 95, 109, 132, 156, 180}},
+    {13, {0, 4.4, 9.6, 15.6, 21.8, 29, 37, 47, 63, 83, 96, 109, 132, 156, 180}},
+    {16, {0, 3.6, 8, 12.5, 18, 25, 33, 44, 62, 83, 96, 110, 132, 156, 180}},
+    {20, {0, 12.8, 25.7, 38.5, 51.4, 64.3, 77, 90, 102, 115, 128, 141, 154, 167, 180}},
+}};
+
+double columnAngle(int row, int column) {
+  std::size_t k = 0;
+  while (k + 2 < kColumnTable.size() && kColumnTable[k + 1].row <= row) ++k;
+  const ColumnAngles &a = kColumnTable[k], &b = kColumnTable[k + 1];
+  const double t = clamp01(static_cast<double>(row - a.row) / (b.row - a.row));
+  const auto c = static_cast<std::size_t>(column);
+  return lerp(a.degrees[c], b.degrees[c], t) * (kPi / 180);
+}
+
+Vec3 gridPoint(int row, int column) {
+  const Row& r = kRowTable[static_cast<std::size_t>(row)];
+  const double angle = columnAngle(row, column), degrees = angle * (180 / kPi);
+  // Height: the front's as far as the cheek, then over to the ear's, then to the nape's.
+  double y = lerp(r.front, r.side, smoothstep(18, 75, degrees));
+  y = lerp(y, r.behind, smoothstep(100, 175, degrees));
+  const double axis_z = r.pitch != 0 || row > kRows - 2 ? -1.5 : 0;
+  const double pitch = r.pitch * (kPi / 180) * (1 - smoothstep(40, 110, degrees));
+  const Vec3 level{std::sin(angle), 0, std::cos(angle)};
+  const Vec3 direction = level * std::cos(pitch) + Vec3{0, std::sin(pitch), 0};
+  Vec3 origin{0, y, axis_z};
+  if (r.pitch != 0) origin.y = y + 7.5 * std::sin(-pitch);
+  Vec3 p = castToSkin(origin + direction * 24, direction * -1);
+  if (column == 0 || column == kColumns) p.x = 0;
+  return p;
+}
+
+class CageBuilder {
+ public:
+  HalfMesh build() {
+    makeGrid();
+    makeCrown();
+    makeEye();
+    makeMouth();
+    makeNostril();
+    makeEar();
+    return std::move(mesh_);
+  }
+
+ private:
+  int add(HalfVertex v) {
+    mesh_.vertices.push_back(v);
+    return static_cast<int>(mesh_.vertices.size()) - 1;
+  }
+  int addSkin(const Vec3& p, bool midline) {
+    HalfVertex v;
+    v.position = p;
+    v.midline = midline;
+    return add(v);
+  }
+  int addStrip(Strip strip, double ring, double around, bool midline = false) {
+    HalfVertex v;
+    v.hold = Hold::strip;
+    v.strip = strip;
+    v.ring = ring;
+    v.around = around;
+    v.midline = midline;
+    v.position = stripPoint(strip, ring, around);
+    return add(v);
+  }
+  void addPolygon(std::vector<int> corners, Material material) {
+    mesh_.polygons.push_back({std::move(corners), material});
+  }
+  int& grid(int row, int column) { return grid_[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)]; }
+  const Vec3& at(int v) const { return mesh_.vertices[static_cast<std::size_t>(v)].position; }
+
+  static bool inEye(int r, int c) { return r >= kEyeTop && r < kEyeBottom && c >= kEyeInner && c < kEyeOuter; }
+  static bool inMouth(int r, int c) { return r >= kMouthTop && r < kMouthBottom && c < kMouthOuter; }
+  static bool inNostril(int r, int c) { return r == kNostrilRow && c == kNostrilColumn; }
+  static bool inEar(int r, int c) { return r >= kEarTop && r < kEarBottom && c >= kEarFront && c < kEarBehind; }
+  // Strictly inside a block: no grid vertex there.
+  static bool insideBlock(int r, int c) {
+    return (r > kEyeTop && r < kEyeBottom && c > kEyeInner && c < kEyeOuter) ||
+           (r > kMouthTop && r < kMouthBottom && c < kMouthOuter) ||
+           (r > kEarTop && r < kEarBottom && c > kEarFront && c < kEarBehind);
+  }
+
+  void makeGrid() {
+    for (int r = 0; r <= kRows; ++r)
+      for (int c = 0; c <= kColumns; ++c) {
+        grid(r, c) = -1;
+        if (insideBlock(r, c)) continue;
+        grid(r, c) = addSkin(gridPoint(r, c), c == 0 || c == kColumns);
+        mesh_.vertices.back().border = r == kRows;
+      }
+    for (int r = 0; r < kRows; ++r)
+      for (int c = 0; c < kColumns; ++c)
+        if (!inEye(r, c) && !inMouth(r, c) && !inNostril(r, c) && !inEar(r, c))
+          addPolygon({grid(r, c), grid(r + 1, c), grid(r + 1, c + 1), grid(r, c + 1)}, Material::skin);
+  }
+
+  // The uppermost row closed by a patch of quads: 3 to the side, the others from front to back.
+  void makeCrown() {
+    constexpr int kAcross = 3, kAlong = kColumns - 2 * kAcross;
+    std::array<std::array<int, kAcross + 1>, kAlong + 1> cap{};
+    for (int a = 0; a <= kAlong; ++a)
+      for (int s = 0; s <= kAcross; ++s) {
+        int v = -1;
+        if (a == 0)
+          v = grid(0, s);
+        else if (a == kAlong)
+          v = grid(0, kColumns - s);
+        else if (s == kAcross)
+          v = grid(0, kAcross + a);
+        else {
+          const Vec3 rim = at(grid(0, kAcross + a));
+          const double t = static_cast<double>(s) / kAcross;
+          const Vec3 front = at(grid(0, s)), back = at(grid(0, kColumns - s));
+          const double f = static_cast<double>(a) / kAlong;
+          const Vec3 flat{lerp(rim.x * t, lerp(front.x, back.x, f), 0.3), 0,
+                          lerp(rim.z, lerp(front.z, back.z, f), 0.6)};
+          Vec3 p = castToSkin({flat.x, 20, flat.z}, {0, -1, 0});
+          if (s == 0) p.x = 0;
+          v = addSkin(p, s == 0);
+        }
+        cap[static_cast<std::size_t>(a)][static_cast<std::size_t>(s)] = v;
+      }
+    for (std::size_t a = 0; a < kAlong; ++a)
+      for (std::size_t s = 0; s < kAcross; ++s)
+        addPolygon({cap[a][s], cap[a][s + 1], cap[a + 1][s + 1], cap[a + 1][s]}, Material::skin);
+    // (Seen from above the front row comes first and the side grows to the left: counter-clockwise is front, side,
+    // back.)
+  }
+
+  // Quads between an outer ring and the next ring inward, both clockwise seen from outside.
+  void joinRings(const std::vector<int>& outer, const std::vector<int>& inner, bool closed, Material material) {
+    const std::size_t n = outer.size(), count = closed ? n : n - 1;
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t j = (i + 1) % n;
+      addPolygon({outer[i], inner[i], inner[j], outer[j]}, material);
+    }
+  }
+
+  std::vector<int> skinRing(const std::vector<int>& block, Strip strip, double ring, double t, bool open) {
+    std::vector<int> out;
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      const Vec3 inner = stripPoint(strip, ring, static_cast<double>(i));
+      const bool midline = open && (i == 0 || i + 1 == block.size());
+      Vec3 p = lerp(at(block[i]), inner, t);
+      if (midline) p.x = 0;
+      out.push_back(addSkin(projectToSkin(p), midline));
+    }
+    return out;
+  }
+  std::vector<int> stripRing(Strip strip, double ring, int count, bool open) {
+    std::vector<int> out;
+    for (int i = 0; i < count; ++i) out.push_back(addStrip(strip, ring, i, open && (i == 0 || i + 1 == count)));
+    return out;
+  }
+
+  void makeEye() {
+    std::vector<int> block;
+    constexpr int kMiddle = (kEyeTop + kEyeBottom) / 2;
+    for (int r = kMiddle; r > kEyeTop; --r) block.push_back(grid(r, kEyeInner));
+    for (int c = kEyeInner; c < kEyeOuter; ++c) block.push_back(grid(kEyeTop, c));
+    for (int r = kEyeTop; r < kEyeBottom; ++r) block.push_back(grid(r, kEyeOuter));
+    for (int c = kEyeOuter; c > kEyeInner; --c) block.push_back(grid(kEyeBottom, c));
+    for (int r = kEyeBottom; r > kMiddle; --r) block.push_back(grid(r, kEyeInner));
+    const auto orbit = skinRing(block, Strip::eye, kLidMarginFront, 0.34, false);
+    const auto fold = skinRing(block, Strip::eye, kLidMarginFront, 0.68, false);
+    const auto front = stripRing(Strip::eye, kLidMarginFront, kEyeAround, false);
+    const auto back = stripRing(Strip::eye, kLidMarginBack, kEyeAround, false);
+    const auto pocket = stripRing(Strip::eye, kLidPocket, kEyeAround, false);
+    joinRings(block, orbit, true, Material::skin);
+    joinRings(orbit, fold, true, Material::skin);
+    joinRings(fold, front, true, Material::skin);
+    joinRings(front, back, true, Material::caruncle);
+    joinRings(back, pocket, true, Material::caruncle);
+  }
+
+  void makeMouth() {
+    std::vector<int> block;
+    for (int c = 0; c < kMouthOuter; ++c) block.push_back(grid(kMouthTop, c));
+    for (int r = kMouthTop; r < kMouthBottom; ++r) block.push_back(grid(r, kMouthOuter));
+    for (int c = kMouthOuter; c >= 0; --c) block.push_back(grid(kMouthBottom, c));
+    const auto around = skinRing(block, Strip::mouth, kLipBorder, 0.55, true);
+    std::vector<std::vector<int>> rings;
+    for (double ring = kLipBorder; ring <= kMouthBack; ring += 1)
+      rings.push_back(stripRing(Strip::mouth, ring, kMouthAround + 1, true));
+    joinRings(block, around, false, Material::skin);
+    joinRings(around, rings[0], false, Material::skin);
+    joinRings(rings[0], rings[1], false, Material::lips);
+    joinRings(rings[1], rings[2], false, Material::lips);
+    for (std::size_t k = 2; k + 1 < rings.size(); ++k) joinRings(rings[k], rings[k + 1], false, Material::mouth);
+    const auto& back = rings.back();  // closed at the throat: upper half to lower half
+    for (std::size_t i = 0; i < 4; ++i) addPolygon({back[i], back[10 - i], back[9 - i], back[i + 1]}, Material::mouth);
+    addPolygon({back[4], back[6], back[5]}, Material::mouth);
+  }
+
+  void makeNostril() {
+    const std::vector<int> block{grid(kNostrilRow, kNostrilColumn), grid(kNostrilRow, kNostrilColumn + 1),
+                                 grid(kNostrilRow + 1, kNostrilColumn + 1), grid(kNostrilRow + 1, kNostrilColumn)};
+    std::vector<std::vector<int>> rings{block};
+    for (double ring = kNostrilRim; ring <= kNostrilFloor; ring += 1)
+      rings.push_back(stripRing(Strip::nostril, ring, kNostrilAround, false));
+    joinRings(rings[0], rings[1], true, Material::skin);
+    joinRings(rings[1], rings[2], true, Material::nostril);
+    joinRings(rings[2], rings[3], true, Material::nostril);
+    addPolygon({rings[3][0], rings[3][3], rings[3][2], rings[3][1]}, Material::nostril);
+  }
+
+  void makeEar() {
+    std::vector<int> block;  // from the middle of the front side over the top
+    constexpr int kMiddle = (kEarTop + kEarBottom) / 2;
+    for (int r = kMiddle; r > kEarTop; --r) block.push_back(grid(r, kEarFront));
+    for (int c = kEarFront; c < kEarBehind; ++c) block.push_back(grid(kEarTop, c));
+    for (int r = kEarTop; r < kEarBottom; ++r) block.push_back(grid(r, kEarBehind));
+    for (int c = kEarBehind; c > kEarFront; --c) block.push_back(grid(kEarBottom, c));
+    for (int r = kEarBottom; r > kMiddle; --r) block.push_back(grid(r, kEarFront));
+    std::vector<std::vector<int>> rings{block};
+    for (double ring = kEarRoot; ring <= kEarFloor; ring += 1)
+      rings.push_back(stripRing(Strip::ear, ring, kEarAround, false));
+    for (std::size_t k = 0; k + 1 < rings.size(); ++k) joinRings(rings[k], rings[k + 1], true, Material::skin);
+    const auto& f = rings.back();
+    // Cap: a ladder from front to back.
+    addPolygon({f[0], f[11], f[1]}, Material::skin);
+    for (std::size_t i = 1; i < 5; ++i) addPolygon({f[i], f[12 - i], f[11 - i], f[i + 1]}, Material::skin);
+    addPolygon({f[5], f[7], f[6]}, Material::skin);
+  }
+
+  HalfMesh mesh_;
+  std::array<std::array<int, kColumns + 1>, kRows + 1> grid_{};
+};
+
+void place(HalfVertex& v) {
+  if (v.hold == Hold::strip) v.position = stripPoint(v.strip, v.ring, v.around);
+  if (v.midline) v.position.x = 0;
+}
+
+// The vertex in the middle of others of the coarser mesh.
+HalfVertex between(const std::vector<HalfVertex>& vertices, const std::vector<int>& of) {
+  HalfVertex out;
+  const double n = static_cast<double>(of.size());
+  bool strip = true, linear = false, midline = true, border = true;
+  const HalfVertex& first = vertices[static_cast<std::size_t>(of[0])];
+  const int period = stripPeriod(first.strip);
+  double lowest = 1e9, highest = -1e9;
+  for (const int i : of) {
+    const HalfVertex& v = vertices[static_cast<std::size_t>(i)];
+    out.position = out.position + v.position;
+    strip = strip && v.hold == Hold::strip && v.strip == first.strip;
+    linear = linear || v.hold == Hold::linear;
+    midline = midline && v.midline;
+    border = border && v.border;
+    double around = v.around;
+    if (strip && period > 0) {
+      if (around - first.around > period / 2.0) around -= period;
+      if (around - first.around < -period / 2.0) around += period;
+    }
+    out.ring += v.ring;
+    out.around += around;
+    lowest = std::min(lowest, around);
+    highest = std::max(highest, around);
+  }
+  out.position = out.position * (1 / n);
+  out.midline = midline && of.size() == 2;
+  out.border = border && of.size() == 2;
+  if (strip && highest - lowest > 1.001) linear = true;  // across a cap, not along a ring
+  if (linear) {
+    out.hold = Hold::linear;
+  } else if (strip) {
+    out.hold = Hold::strip;
+    out.strip = first.strip;
+    out.ring /= n;
+    out.around /= n;
+    if (period > 0 && out.around < 0) out.around += period;
+  }
+  place(out);
+  return out;
+}
+
+}  // namespace
+
+HalfMesh makeCage() { return CageBuilder().build(); }
+
+HalfMesh split(const HalfMesh& coarse) {
+  HalfMesh fine;
+  fine.vertices = coarse.vertices;
+  std::unordered_map<std::uint64_t, int> middle;  // looked up only, never iterated
+  const auto edgeMiddle = [&](int a, int b) {
+    const auto key = (static_cast<std::uint64_t>(std::min(a, b)) << 32) | static_cast<std::uint64_t>(std::max(a, b));
+    const auto [it, is_new] = middle.try_emplace(key, static_cast<int>(fine.vertices.size()));
+    if (is_new) fine.vertices.push_back(between(coarse.vertices, {std::min(a, b), std::max(a, b)}));
+    return it->second;
+  };
+  for (const Polygon& polygon : coarse.polygons) {
+    const std::size_t n = polygon.corners.size();
+    const int centre = static_cast<int>(fine.vertices.size());
+    fine.vertices.push_back(between(coarse.vertices, polygon.corners));
+    for (std::size_t i = 0; i < n; ++i) {
+      const int before = polygon.corners[(i + n - 1) % n], here = polygon.corners[i],
+                after = polygon.corners[(i + 1) % n];
+      fine.polygons.push_back({{here, edgeMiddle(here, after), centre, edgeMiddle(before, here)}, polygon.material});
+    }
+  }
+  return fine;
+}
+
+void relax(HalfMesh& mesh, int rounds, double strength) {
+  const std::size_t n = mesh.vertices.size();
+  std::vector<std::vector<int>> neighbours(n);
+  for (const Polygon& polygon : mesh.polygons)
+    for (std::size_t i = 0; i < polygon.corners.size(); ++i) {
+      const int a = polygon.corners[i], b = polygon.corners[(i + 1) % polygon.corners.size()];
+      auto& na = neighbours[static_cast<std::size_t>(a)];
+      auto& nb = neighbours[static_cast<std::size_t>(b)];
+      if (std::find(na.begin(), na.end(), b) == na.end()) na.push_back(b);
+      if (std::find(nb.begin(), nb.end(), a) == nb.end()) nb.push_back(a);
+    }
+  std::vector<Vec3> next(n);
+  for (int round = 0; round <= rounds; ++round) {
+    for (std::size_t i = 0; i < n; ++i) {
+      HalfVertex& v = mesh.vertices[i];
+      next[i] = v.position;
+      if (v.hold != Hold::skin) continue;
+      if (round > 0) {
+        Vec3 sum;
+        double weight = 0;
+        for (const int j : neighbours[i]) {
+          const HalfVertex& other = mesh.vertices[static_cast<std::size_t>(j)];
+          if (v.border && !other.border) continue;
+          // On the midline the mirrored neighbour pulls as much as the one we have.
+          const double w = v.midline && !other.midline ? 2 : 1;
+          sum = sum + other.position * w;
+          weight += w;
+        }
+        if (v.midline) sum.x = 0;
+        // Along the skin only: without that, tips and ridges lose their vertices.
+        Vec3 move = (sum * (1 / weight) - v.position) * strength;
+        const Vec3 normal = normalized(skinGradient(v.position));
+        move = move - normal * dot(move, normal);
+        next[i] = v.position + move;
+        if (v.midline) next[i].x = 0;
+      }
+      const double height = v.position.y;
+      next[i] = projectToSkin(next[i]);
+      if (v.border) next[i].y = height;
+    }
+    for (std::size_t i = 0; i < n; ++i) mesh.vertices[i].position = next[i];
+  }
+}
+
+}  // namespace volto::head

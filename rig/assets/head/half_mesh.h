@@ -1,0 +1,66 @@
+// The left half of the skin while it is being made: polygons over vertices that know how they are held in place.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "rig/assets/head/strips.h"
+#include "rig/assets/head/vec3.h"
+
+namespace volto::head {
+
+enum class Hold : unsigned char {
+  skin,    // free to slide, drawn onto the field
+  strip,   // where stripPoint(strip, ring, around) says
+  linear,  // between its neighbours of the coarser mesh
+};
+
+struct HalfVertex {
+  Vec3 position;
+  Hold hold = Hold::skin;
+  Strip strip = Strip::none;
+  double ring = 0, around = 0;
+  bool midline = false;
+  bool border = false;  // lower end of the neck: keeps its height
+};
+
+enum class Material : unsigned char {
+  skin,
+  lips,
+  mouth,
+  nostril,
+  eye_white,
+  iris,
+  iris_rim,
+  pupil,
+  caruncle,
+  teeth,
+  gums,
+  tongue,
+  lashes,
+  brows,
+  count
+};
+
+struct Polygon {
+  std::vector<int> corners;  // counter-clockwise seen from outside
+  Material material = Material::skin;
+};
+
+struct HalfMesh {
+  std::vector<HalfVertex> vertices;
+  std::vector<Polygon> polygons;
+};
+
+// About 500 polygons: a grid around the head with blocks of rings for eye, mouth, nostril and ear, and a cap on the
+// skull.
+HalfMesh makeCage();
+
+// Splits every polygon into quads, one per corner (the topology of Catmull and Clark); new strip vertices get their
+// strip coordinates.
+HalfMesh split(const HalfMesh& coarse);
+
+// Evens out the skin vertices: each moves toward the middle of its neighbours by `strength` and back onto the field.
+void relax(HalfMesh& mesh, int rounds, double strength);
+
+}  // namespace volto::head

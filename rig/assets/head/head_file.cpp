@@ -1,0 +1,147 @@
+// The head as text: OBJ, its MTL, and the feature points.
+#include <charconv>
+#include <cmath>
+
+#include "rig/assets/head/head_mesh.h"
+
+namespace volto::head {
+namespace {
+
+void appendNumber(std::string& out, double value, int decimals) {
+  double scale = 1;
+  for (int i = 0; i < decimals; ++i) scale *= 10;
+  value = std::nearbyint(value * scale) / scale;
+  if (value == 0) value = 0;  // no "-0.00000"
+  char buffer[64];
+  const auto end = std::to_chars(buffer, buffer + sizeof buffer, value, std::chars_format::fixed, decimals).ptr;
+  out.append(buffer, end);
+}
+
+}  // namespace
+
+std::string materialName(Material material) {
+  switch (material) {
+    case Material::skin:
+      return "skin";
+    case Material::lips:
+      return "lips";
+    case Material::mouth:
+      return "mouth";
+    case Material::nostril:
+      return "nostril";
+    case Material::eye_white:
+      return "eye_white";
+    case Material::iris:
+      return "iris";
+    case Material::iris_rim:
+      return "iris_rim";
+    case Material::pupil:
+      return "pupil";
+    case Material::caruncle:
+      return "lid_rim";
+    case Material::teeth:
+      return "teeth";
+    case Material::gums:
+      return "gums";
+    case Material::tongue:
+      return "tongue";
+    case Material::lashes:
+      return "lashes";
+    case Material::brows:
+      return "brows";
+    case Material::count:
+      break;
+  }
+  return "skin";
+}
+
+std::array<double, 3> materialColour(Material material) {
+  switch (material) {
+    case Material::skin:
+      return {0.72, 0.47, 0.36};
+    case Material::lips:
+      return {0.58, 0.24, 0.22};
+    case Material::mouth:
+      return {0.22, 0.06, 0.06};
+    case Material::nostril:
+      return {0.20, 0.08, 0.06};
+    case Material::eye_white:
+      return {0.86, 0.85, 0.83};
+    case Material::iris:
+      return {0.13, 0.28, 0.33};
+    case Material::iris_rim:
+      return {0.04, 0.09, 0.12};
+    case Material::pupil:
+      return {0.01, 0.01, 0.012};
+    case Material::caruncle:
+      return {0.62, 0.33, 0.28};
+    case Material::teeth:
+      return {0.85, 0.82, 0.74};
+    case Material::gums:
+      return {0.52, 0.20, 0.20};
+    case Material::tongue:
+      return {0.55, 0.20, 0.20};
+    case Material::lashes:
+      return {0.03, 0.02, 0.02};
+    case Material::brows:
+      return {0.10, 0.06, 0.045};
+    case Material::count:
+      break;
+  }
+  return {0.8, 0.8, 0.8};
+}
+
+std::string objText(const Head& head, const std::string& mtl_file) {
+  std::string out =
+      "# Volto's head, made by volto-make-head; centimetres, +x the subject's left, +y up, +z out of the face\n";
+  out += "mtllib " + mtl_file + "\n";
+  for (const Vec3& v : head.vertices) {
+    out += "v ";
+    appendNumber(out, v.x, 5);
+    out += ' ';
+    appendNumber(out, v.y, 5);
+    out += ' ';
+    appendNumber(out, v.z, 5);
+    out += '\n';
+  }
+  for (std::size_t c = 0; c < head.components.size(); ++c) {
+    out += "g " + head.components[c].name + "\n";
+    for (std::size_t m = 0; m < static_cast<std::size_t>(Material::count); ++m) {
+      bool named = false;
+      for (std::size_t p = 0; p < head.polygons.size(); ++p) {
+        if (head.polygon_component[p] != static_cast<int>(c) || head.polygons[p].material != static_cast<Material>(m))
+          continue;
+        if (!named) out += "usemtl " + materialName(static_cast<Material>(m)) + "\n";
+        named = true;
+        out += 'f';
+        for (const int corner : head.polygons[p].corners) out += ' ' + std::to_string(corner + 1);
+        out += '\n';
+      }
+    }
+  }
+  return out;
+}
+
+std::string mtlText() {
+  std::string out = "# Materials of Volto's head\n";
+  for (std::size_t m = 0; m < static_cast<std::size_t>(Material::count); ++m) {
+    out += "newmtl " + materialName(static_cast<Material>(m)) + "\nKd";
+    for (const double c : materialColour(static_cast<Material>(m))) {
+      out += ' ';
+      appendNumber(out, c, 3);
+    }
+    out += "\n";
+  }
+  return out;
+}
+
+std::string pointsText(const Head& head) {
+  std::string out = "{\n  \"feature_points\": {\n";
+  for (std::size_t i = 0; i < head.feature_points.size(); ++i) {
+    out += "    \"" + head.feature_points[i].first + "\": " + std::to_string(head.feature_points[i].second);
+    out += i + 1 < head.feature_points.size() ? ",\n" : "\n";
+  }
+  return out + "  }\n}\n";
+}
+
+}  // namespace volto::head

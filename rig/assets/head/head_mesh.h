@@ -1,0 +1,39 @@
+// The whole head: skin and parts, both sides, and its 84 feature points. Deterministic: the same build and the same
+// source give the same bytes, and rounding to five decimals on writing takes away what mathematical libraries differ
+// in.
+#pragma once
+
+#include <array>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "rig/assets/head/half_mesh.h"
+
+namespace volto::head {
+
+struct Component {
+  std::string name;  // OBJ group
+  int first_vertex = 0, vertex_count = 0;
+};
+
+struct Head {
+  std::vector<Vec3> vertices;     // centimetres, +x subject's left, +y up, +z out of the face
+  std::vector<int> mirror;        // vertex of the other side; itself on the midline
+  std::vector<Polygon> polygons;  // grouped by component, counter-clockwise from outside
+  std::vector<int> polygon_component;
+  std::vector<Component> components;
+  std::vector<std::pair<std::string, int>> feature_points;  // id, vertex: all 84, in the mask's order
+};
+
+Head makeHead();
+
+std::string materialName(Material material);
+std::array<double, 3> materialColour(Material material);  // linear RGB
+
+// The files: numbers with five decimals, no negative zero.
+std::string objText(const Head& head, const std::string& mtl_file);
+std::string mtlText();
+std::string pointsText(const Head& head);
+
+}  // namespace volto::head

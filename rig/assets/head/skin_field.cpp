@@ -1,0 +1,146 @@
+#include "rig/assets/head/skin_field.h"
+
+namespace volto::head {
+namespace {
+
+// Polynomial smooth minimum (Quilez): k is the width of the blend in centimetres.
+double melt(double a, double b, double k) {
+  const double h = k - std::fabs(a - b);
+  const double smaller = a < b ? a : b;
+  return h > 0 ? smaller - h * h * h / (6 * k * k) : smaller;
+}
+double carve(double a, double b, double k) { return -melt(-a, b, k); }  // a without b
+
+double ellipsoid(const Vec3& p, const Vec3& c, const Vec3& r) {
+  const Vec3 q = p - c;
+  const double k0 = length({q.x / r.x, q.y / r.y, q.z / r.z});
+  const double k1 = length({q.x / (r.x * r.x), q.y / (r.y * r.y), q.z / (r.z * r.z)});
+  return k1 > 1e-9 ? k0 * (k0 - 1) / k1 : -r.x;
+}
+
+double sphere(const Vec3& p, const Vec3& c, double r) { return length(p - c) - r; }
+
+// A capsule whose radius runs linearly from ra to rb.
+double limb(const Vec3& p, const Vec3& a, double ra, const Vec3& b, double rb) {
+  const Vec3 ab = b - a;
+  const double t = clamp01(dot(p - a, ab) / dot(ab, ab));
+  return length(p - (a + ab * t)) - lerp(ra, rb, t);
+}
+
+// Soft bump of height 1 and the given widths about a point or about a segment.
+double bump(const Vec3& p, const Vec3& c, const Vec3& w) {
+  const Vec3 q = p - c;
+  const double s = q.x * q.x / (w.x * w.x) + q.y * q.y / (w.y * w.y) + q.z * q.z / (w.z * w.z);
+  if (s >= 6.25) return 0;
+  const double t = 1 - s / 6.25;
+  return t * t * t * t;
+}
+double ridge(const Vec3& p, const Vec3& a, const Vec3& b, double width) {
+  const Vec3 ab = b - a;
+  const double t = clamp01(dot(p - a, ab) / dot(ab, ab));
+  const Vec3 q = p - (a + ab * t);
+  const double s = dot(q, q) / (width * width);
+  if (s >= 6.25) return 0;
+  const double u = 1 - s / 6.25;
+  return u * u * u * u;
+}
+
+}  // namespace
+
+double skinDistance(const Vec3& point) {
+  const Vec3 p{std::fabs(point.x), point.y, point.z};
+  const Vec3 m{std::sqrt(p.x * p.x + 0.02), p.y,
+               p.z};  // rounded |x|: no crease at the midline for parts that stand beside it
+
+  // Skull and forehead.
+  double d = ellipsoid(p, {0, 3.1, -0.6}, {7.3, 8.1, 8.8});
+  d = melt(d, ellipsoid(p, {0, 3.7, 2.2}, {6.2, 5.6, 6.9}), 2.0);
+  // Face: maxilla, cheek bones, jaw.
+  d = melt(d, ellipsoid(p, {0, -3.4, 3.0}, {5.3, 6.6, 6.0}), 1.8);
+  d = melt(d, ellipsoid(m, {3.9, -2.5, 5.2}, {2.0, 1.8, 2.1}), 2.2);
+  d = melt(d, limb(m, {4.7, -1.9, 4.4}, 1.1, {5.9, -0.8, 0.6}, 0.9), 1.8);
+  d = melt(d, limb(m, {4.15, -6.6, 1.8}, 1.0, {1.0, -9.5, 7.2}, 1.25), 2.2);
+  d = melt(d, limb(m, {5.4, -2.0, 0.8}, 0.9, {4.15, -6.6, 1.8}, 1.0), 2.2);
+  d = melt(d, ellipsoid(p, {0, -9.7, 7.9}, {1.55, 1.35, 1.75}), 1.6);
+  // Muzzle: the teeth behind the lips.
+  d = melt(d, ellipsoid(p, {0, -6.6, 7.2}, {3.3, 2.7, 2.75}), 1.3);
+  d = melt(d, ellipsoid(m, {1.5, -3.6, 7.75}, {1.5, 2.0, 1.45}), 1.3);
+  // Neck.
+  d = melt(d, limb(p, {0, -5.0, -3.0}, 4.6, {0, -19.5, -3.3}, 5.2), 2.6);
+  d = melt(d, limb(m, {5.0, -4.2, -2.4}, 0.8, {1.3, -18.5, 1.2}, 0.8), 1.6);
+  d = melt(d, ellipsoid(p, {0, -13.4, 1.6}, {0.8, 1.2, 0.7}), 1.4);
+
+  // Orbits and brow ridge.
+  d = carve(d, ellipsoid(m, {3.0, 0.25, 9.2}, {1.9, 1.15, 1.55}), 1.3);
+  d = melt(d, limb(m, {0.6, 1.7, 8.35}, 0.6, {3.2, 2.15, 7.75}, 0.65), 1.1);
+  d = melt(d, limb(m, {3.2, 2.15, 7.75}, 0.65, {5.2, 0.9, 5.6}, 0.5), 1.2);
+
+  // Nose: bridge, tip, wings, columella.
+  double nose = limb(p, {0, 0.7, 8.3}, 0.60, {0, -1.4, 9.35}, 0.66);
+  nose = melt(nose, limb(p, {0, -1.4, 9.35}, 0.66, {0, -3.2, 10.4}, 0.74), 0.3);
+  nose = melt(nose, ellipsoid(p, {0, -3.45, 10.75}, {0.92, 0.76, 0.85}), 0.6);
+  nose = melt(nose, ellipsoid(m, {1.08, -3.90, 9.72}, {0.62, 0.58, 0.80}), 0.9);
+  nose = melt(nose, limb(p, {0, -3.9, 10.6}, 0.36, {0, -4.45, 9.7}, 0.42), 0.45);
+  d = melt(d, nose, 0.9);
+
+  // The lids lie on a sphere a little larger than the eyeball.
+  d = melt(d, sphere({m.x, p.y, p.z}, kEyeCentre, kEyeRadius + kLidThickness), 0.45);
+
+  // Sculpting: + digs in, - builds up.
+  d += 0.10 * bump(p, {0, -5.15, 10.2}, {0.28, 0.6, 0.9});            // philtrum
+  d += 0.16 * ridge(p, {1.78, -3.6, 9.4}, {1.70, -4.40, 9.3}, 0.26);  // groove behind the nose wing
+  d += 0.10 * ridge(p, {1.95, -4.3, 9.2}, {3.2, -6.4, 8.6}, 0.6);     // nasolabial fold
+  d += 0.20 * bump(p, {0, -8.45, 9.7}, {1.6, 0.45, 1.2});             // under the lower lip
+  d += 0.22 * bump(p, {5.8, 2.6, 5.0}, {1.2, 2.2, 2.0});              // temple
+  d += 0.12 * bump(p, {4.6, -5.4, 6.0}, {1.2, 1.8, 1.8});             // hollow of the cheek
+  return d;
+}
+
+Vec3 skinGradient(const Vec3& p) {
+  constexpr double kStep = 1e-4;
+  const double gx = skinDistance({p.x + kStep, p.y, p.z}) - skinDistance({p.x - kStep, p.y, p.z});
+  const double gy = skinDistance({p.x, p.y + kStep, p.z}) - skinDistance({p.x, p.y - kStep, p.z});
+  const double gz = skinDistance({p.x, p.y, p.z + kStep}) - skinDistance({p.x, p.y, p.z - kStep});
+  return Vec3{gx, gy, gz} * (0.5 / kStep);
+}
+
+Vec3 projectToSkin(Vec3 p) {
+  const bool midline = p.x == 0;
+  for (int i = 0; i < 6; ++i) {
+    const double d = skinDistance(p);
+    if (std::fabs(d) < 1e-7) break;
+    Vec3 g = skinGradient(p);
+    if (midline) g.x = 0;
+    const double gg = dot(g, g);
+    if (gg < 1e-6) break;
+    double step = d / gg;
+    const double far = 0.5 / std::sqrt(gg);  // never further than half a centimetre at once
+    step = step > far ? far : (step < -far ? -far : step);
+    p = p - g * step;
+  }
+  if (midline) p.x = 0;
+  return p;
+}
+
+Vec3 castToSkin(const Vec3& origin, const Vec3& direction) {
+  const Vec3 n = normalized(direction);
+  double t = 0, inside = -1, outside = 0;
+  for (int i = 0; i < 400; ++i) {
+    const double d = skinDistance(origin + n * t);
+    if (d < 0) {
+      inside = t;
+      break;
+    }
+    outside = t;
+    t += 0.6 * d + 1e-3;
+    if (t > 60) break;
+  }
+  if (inside < 0) return origin + n * outside;
+  for (int i = 0; i < 40; ++i) {
+    const double mid = 0.5 * (inside + outside);
+    (skinDistance(origin + n * mid) < 0 ? inside : outside) = mid;
+  }
+  return origin + n * outside;
+}
+
+}  // namespace volto::head

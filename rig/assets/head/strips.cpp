@@ -1,0 +1,208 @@
+#include "rig/assets/head/strips.h"
+
+#include "rig/assets/head/skin_field.h"
+
+namespace volto::head {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+// Piecewise linear or smooth table over equally spaced knots (Catmull-Rom).
+template <std::size_t N>
+double spline(const double (&knots)[N], double t) {
+  t = t < 0 ? 0 : (t > static_cast<double>(N - 1) ? static_cast<double>(N - 1) : t);
+  std::size_t i = static_cast<std::size_t>(t);
+  if (i > N - 2) i = N - 2;
+  const double f = t - static_cast<double>(i);
+  const double p1 = knots[i], p2 = knots[i + 1];
+  const double p0 = i > 0 ? knots[i - 1] : 2 * p1 - p2;
+  const double p3 = i + 2 < N ? knots[i + 2] : 2 * p2 - p1;
+  return p1 + 0.5 * f * (p2 - p0 + f * (2 * p0 - 5 * p1 + 4 * p2 - p3 + f * (3 * (p1 - p2) + p3 - p0)));
+}
+
+template <std::size_t N>
+double wrappedSpline(const double (&knots)[N], double t) {
+  const double n = static_cast<double>(N);
+  t -= n * std::floor(t / n);
+  std::size_t i = static_cast<std::size_t>(t);
+  if (i >= N) i = 0;
+  const double f = t - std::floor(t);
+  const double p0 = knots[(i + N - 1) % N], p1 = knots[i], p2 = knots[(i + 1) % N], p3 = knots[(i + 2) % N];
+  return p1 + 0.5 * f * (p2 - p0 + f * (2 * p0 - 5 * p1 + 4 * p2 - p3 + f * (3 * (p1 - p2) + p3 - p0)));
+}
+
+// --- Eye
+// -------------------------------------------------------------------------------------------------------------------------
+
+// Palpebral fissure relative to the eyeball's centre, 16 knots around from the inner corner over the upper lid.
+constexpr double kFissureX[16] = {-1.50, -1.22, -0.82, -0.38, 0.06, 0.50,  0.90,  1.22,
+                                  1.44,  1.24,  0.94,  0.54,  0.08, -0.40, -0.84, -1.22};
+constexpr double kFissureY[16] = {-0.17, 0.12,  0.37,  0.52,  0.58,  0.56,  0.46,  0.29,
+                                  0.05,  -0.17, -0.35, -0.47, -0.52, -0.50, -0.43, -0.31};
+
+Vec3 onLidSphere(double x, double y, double radius) {
+  const double flat = x * x + y * y;
+  const double r2 = radius * radius;
+  // Near the corners the margin leaves the sphere and runs straight to the corner.
+  const double z2 = r2 - flat;
+  const double floor2 = 0.30 * 0.30;
+  return {x, y, std::sqrt(z2 > floor2 ? z2 : floor2)};
+}
+
+Vec3 eyePoint(double ring, double around) {
+  const double x = wrappedSpline(kFissureX, around), y = wrappedSpline(kFissureY, around);
+  const Vec3 front = onLidSphere(x, y, kEyeRadius + kLidThickness);
+  const double inner = (kEyeRadius + kLidGap) / (kEyeRadius + kLidThickness);
+  const Vec3 back = front * inner;
+  if (ring <= kLidMarginBack) return kEyeCentre + lerp(front, back, clamp01(ring - kLidMarginFront));
+  // Behind the lids: along the eyeball, away from the opening.
+  const Vec3 deep = normalized(Vec3{back.x * 1.15, back.y * 1.7 + (y > 0 ? 0.25 : -0.25), back.z * 0.75}) *
+                    (kEyeRadius + kLidGap + 0.03);
+  Vec3 p = lerp(back, deep, clamp01(ring - kLidMarginBack));
+  const double keep = kEyeRadius + kLidGap;
+  if (length(p) < keep) p = normalized(p) * keep;
+  return kEyeCentre + p;
+}
+
+// --- Mouth
+// -----------------------------------------------------------------------------------------------------------------------
+
+constexpr double kMouthGap = 0.006;  // half of the hair's gap between the closed lips
+// 11 knots from the middle of the upper lip over the corner to the middle of the lower lip.
+constexpr double kBorderX[11] = {0.0, 0.52, 1.13, 1.75, 2.28, 2.62, 2.25, 1.72, 1.14, 0.57, 0.0};
+constexpr double kBorderY[11] = {-5.88, -5.74, -5.93, -6.20, -6.46, -6.68, -6.98, -7.28, -7.47, -7.56, -7.58};
+constexpr double kRimX[11] = {0.0, 0.50, 1.06, 1.62, 2.12, 2.50, 2.12, 1.62, 1.06, 0.50, 0.0};
+constexpr double kRimY[11] = {-6.66, -6.62, -6.60, -6.62, -6.66, -6.69, -6.66, -6.62, -6.60, -6.62, -6.66};
+constexpr double kRimBack[11] = {0.12, 0.13, 0.15, 0.16, 0.14, 0.10, 0.14, 0.16, 0.14, 0.12, 0.12};
+constexpr double kFullness[11] = {0.42, 0.40, 0.36, 0.28, 0.16, 0.03, 0.16, 0.32, 0.44, 0.48, 0.50};
+
+Vec3 lipBorder(double around) {
+  const Vec3 p{spline(kBorderX, around), spline(kBorderY, around), 0};
+  return castToSkin({p.x, p.y, 16}, {0, 0, -1});
+}
+
+Vec3 lipRim(double around) {
+  const double side = around < 5 ? 1 : (around > 5 ? -1 : 0);
+  const double x = spline(kRimX, around), y = spline(kRimY, around);
+  const Vec3 skin = castToSkin({x, y, 16}, {0, 0, -1});
+  const double part = clamp01(std::fabs(around - 5) / 0.5);
+  return {x, y + side * part * kMouthGap, skin.z - spline(kRimBack, around)};
+}
+
+Vec3 mouthPoint(double ring, double around) {
+  const Vec3 border = lipBorder(around), rim = lipRim(around);
+  const double up = around < 5 ? 1 : (around > 5 ? -1 : 0);
+  const double open = clamp01(std::fabs(around - 5) / 5);  // 0 at the corner, 1 in the middle
+  if (ring <= kLipRim) {
+    const double t = clamp01((ring - kLipBorder) / (kLipRim - kLipBorder));
+    Vec3 bulge = lerp(border, rim, 0.55);
+    bulge.z = (border.z > rim.z ? border.z : rim.z) + spline(kFullness, around);
+    return border * ((1 - t) * (1 - t)) + bulge * (2 * t * (1 - t)) + rim * (t * t);
+  }
+  // The lips touch for a while, then open into the vestibule, the mouth and the throat.
+  const double spread = std::sqrt(open * (2 - open));
+  const Vec3 contact{rim.x * 0.985, rim.y + up * 0.01 * open, rim.z - 0.30};
+  if (ring <= kMouthVestibule) return lerp(rim, contact, clamp01(ring - kLipRim));
+  const Vec3 middle{rim.x * 1.05, -6.66 + up * (0.10 + (up > 0 ? 1.25 : 1.45) * spread),
+                    rim.z - 0.62 - 0.5 * (1 - open)};
+  if (ring <= 6) return lerp(contact, middle, ring - kMouthVestibule);
+  const Vec3 back{rim.x * 1.0, -6.75 + up * (0.12 + (up > 0 ? 1.3 : 1.5) * spread), 4.6 - 0.4 * spread};
+  return lerp(middle, back, clamp01(ring - 6));
+}
+
+// --- Nostril
+// ---------------------------------------------------------------------------------------------------------------------
+
+Vec3 nostrilPoint(double ring, double around) {
+  const double a = (around + 0.5) * (kPi / 2);  // 0: front, towards the middle; 1: front, outward; then behind
+  const Vec3 centre{0.66, -4.35, 10.0};
+  const Vec3 across{0.24, 0.03, -0.09}, along{-0.09, 0.10, 0.31};
+  const Vec3 inward{-0.05, 0.85, -0.50};
+  const double grow = 1.0 - 0.25 * clamp01((ring - 2) / 1.0);
+  const Vec3 target = centre - across * (std::cos(a) * grow) + along * (std::sin(a) * grow);
+  const Vec3 rim = castToSkin(target - inward * 1.1, inward);
+  return rim + inward * (0.30 * (ring - kNostrilRim));
+}
+
+// --- Ear
+// -------------------------------------------------------------------------------------------------------------------------
+
+// The ear's outline in its own plane: back (a) and up (b) from the middle of the root; 12 knots from the front over the
+// top.
+constexpr double kOutlineA[12] = {-0.80, -0.72, -0.42, 0.45, 1.55, 2.12, 2.10, 1.75, 1.20, 0.45, -0.25, -0.66};
+constexpr double kOutlineB[12] = {-0.25, 1.05, 2.30, 3.00, 2.65, 1.60, 0.20, -1.15, -2.25, -2.95, -2.60, -1.55};
+
+Vec3 earPoint(double ring, double around) {
+  const double flare = 0.36, tilt = 0.16;  // radians: out from the skull, and backward
+  const double cf = std::cos(flare), sf = std::sin(flare), ct = std::cos(tilt), st = std::sin(tilt);
+  const Vec3 back0{sf, 0, -cf}, out{cf, 0, sf}, up0{0, 1, 0};
+  const Vec3 back = back0 * ct - up0 * st, up = up0 * ct + back0 * st;
+  const Vec3 origin{6.35, -1.65, 0.45};
+  const double oa = wrappedSpline(kOutlineA, around), ob = wrappedSpline(kOutlineB, around);
+  const auto at = [&](double a, double b, double h) { return origin + back * a + up * b + out * h; };
+
+  // How much of a free edge there is: none in front, where the ear grows out of the cheek.
+  const double phase = 2 * kPi * around / kEarAround;
+  const double free_edge = smoothstep(-0.80, -0.10, -std::cos(phase));
+  const double ra = lerp(oa, 0.55 * oa - 0.25, free_edge), rb = lerp(ob, 0.78 * ob, free_edge);
+  Vec3 root = at(ra, rb, 0);
+  root = castToSkin({14, root.y, root.z}, {-1, 0, 0});
+  const Vec3 cavity{0.05, -0.35, 0};
+  const auto shrunk = [&](double s, double h) { return at(lerp(cavity.x, oa, s), lerp(cavity.y, ob, s), h); };
+
+  const double lobe = smoothstep(-1.3, -2.2, ob);  // 1 in the lobe: no folds there
+  // In front of the ear hole stands the tragus.
+  const double tragus = std::exp(-4.0 * (ob + 0.45) * (ob + 0.45)) * (1 - free_edge);
+  const Vec3 rings[8] = {
+      root,                                                                                       // 1 on the head
+      lerp(lerp(root, shrunk(0.95, 0.2), 0.3), lerp(root, shrunk(0.93, 0.46), 0.72), free_edge),  // 2 back of the ear
+      lerp(shrunk(0.90, 0.22 + 0.25 * tragus), shrunk(1.0, 0.60), free_edge),                     // 3 edge
+      lerp(shrunk(0.82, 0.30 + 0.42 * tragus), shrunk(0.93, lerp(0.78, 0.70, lobe)), free_edge),  // 4 helix
+      lerp(shrunk(0.68, 0.30 + 0.45 * tragus), shrunk(0.80, lerp(0.46, 0.70, lobe)), free_edge),  // 5 groove
+      lerp(shrunk(0.58, 0.18 + 0.25 * tragus), shrunk(0.63, lerp(0.66, 0.66, lobe)), free_edge),  // 6 antihelix
+      lerp(shrunk(0.46, -0.10), shrunk(0.44, lerp(0.15, 0.25, lobe)), free_edge),  // 7 wall of the concha
+      shrunk(0.24, -0.18),                                                         // 8 floor
+  };
+  const double r = ring - kEarRoot;
+  int i = static_cast<int>(r);
+  i = i < 0 ? 0 : (i > 6 ? 6 : i);
+  return lerp(rings[i], rings[i + 1], clamp01(r - i));
+}
+
+}  // namespace
+
+int stripPeriod(Strip strip) {
+  switch (strip) {
+    case Strip::eye:
+      return kEyeAround;
+    case Strip::nostril:
+      return kNostrilAround;
+    case Strip::ear:
+      return kEarAround;
+    default:
+      return 0;
+  }
+}
+
+Vec3 lidMargin(double around) { return eyePoint(kLidMarginFront, around); }
+
+Vec3 stripPoint(Strip strip, double ring, double around) {
+  switch (strip) {
+    case Strip::eye:
+      return eyePoint(ring, around);
+    case Strip::mouth: {
+      Vec3 p = mouthPoint(ring, around);
+      if (around <= 0 || around >= kMouthAround) p.x = 0;
+      return p;
+    }
+    case Strip::nostril:
+      return nostrilPoint(ring, around);
+    case Strip::ear:
+      return earPoint(ring, around);
+    case Strip::none:
+      break;
+  }
+  return {};
+}
+
+}  // namespace volto::head
