@@ -1,0 +1,177 @@
+#include "rig/association.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Geometry>
+
+namespace volto::rig {
+namespace {
+
+constexpr double kRayLimitEs = 0.4;
+
+struct MaskFace {
+  Eigen::Vector3d a, ab, ac, normal;
+  std::array<std::uint8_t, 3> points;
+  SlitSide side;
+};
+
+std::vector<MaskFace> maskFaces(const FeaturePointPositions& points) {
+  std::vector<MaskFace> faces;
+  const auto triangles = maskTriangles();
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    const auto& ids = triangles[t];
+    const Eigen::Vector3d a = points.row(ids[0]), b = points.row(ids[1]), c = points.row(ids[2]);
+    faces.push_back({a, b - a, c - a, (b - a).cross(c - a), ids, slitSideOfTriangle(t)});
+  }
+  return faces;
+}
+
+struct Hit {
+  double distance = 0;  // along the line, without sign
+  std::array<double, 3> barycentric{};
+};
+
+// The line through p along n against a triangle. A little beyond the edges still counts, so that no gap opens between
+// triangles.
+bool intersect(const MaskFace& face, const Eigen::Vector3d& p, const Eigen::Vector3d& n, Hit& hit) {
+  const double facing = n.dot(face.normal);
+  if (facing <= 0) return false;  // angle of 90 degrees or more
+  const double s = face.normal.dot(face.a - p) / facing;
+  const Eigen::Vector3d q = p + s * n - face.a;
+  const double area2 = face.normal.squaredNorm();
+  const double v = face.normal.dot(q.cross(face.ac)) / area2;
+  const double w = face.normal.dot(face.ab.cross(q)) / area2;
+  const double u = 1 - v - w;
+  constexpr double kSlack = -1e-6;
+  if (!(u >= kSlack && v >= kSlack && w >= kSlack)) return false;
+  hit.distance = std::abs(s);
+  hit.barycentric = {std::max(u, 0.0), std::max(v, 0.0), std::max(w, 0.0)};
+  return true;
+}
+
+class Associator {
+ public:
+  Associator(const Mesh& mesh, const Skin& skin, const FeaturePointPositions& points, double eye_separation,
+             SkinAssociation& out)
+      : mesh_(mesh), skin_(skin), points_(points), es_(eye_separation), faces_(maskFaces(points)), out_(out) {}
+
+  // The closest triangle that the vertex's normal meets, that faces the same way, on the same lip or lid, and that is
+  // near along the skin.
+  bool byRay(std::uint32_t v) {
+    const Eigen::Vector3d p = mesh_.positions.row(v), n = skin_.normals.row(v);
+    if (n.squaredNorm() == 0) return false;
+    double best = kRayLimitEs * es_;
+    bool found = false;
+    for (std::size_t t = 0; t < faces_.size(); ++t) {
+      Hit hit;
+      if (!intersect(faces_[t], p, n, hit) || hit.distance >= best) continue;
+      if (onOtherSide(v, faces_[t].side) || !nearAlongSkin(v, faces_[t], hit)) continue;
+      best = hit.distance;
+      found = true;
+      out_.triangle[v] = static_cast<std::int16_t>(t);
+      out_.barycentric[v] = hit.barycentric;
+      out_.side[v] = faces_[t].side;
+    }
+    if (found) out_.kind[v] = AssociationKind::ray;
+    return found;
+  }
+
+  // The triangle at the feature point with the shortest path; of those, the one whose other points are nearest.
+  void byPath(std::uint32_t v, const RegionsOfInfluence& regions) {
+    Eigen::Index nearest = 0;
+    const auto distances = out_.point_distance.row(v);
+    if (!(distances.minCoeff(&nearest) < kUnreached)) return;
+    double best = std::numeric_limits<double>::infinity();
+    const SlitSide side = slitSide(static_cast<std::size_t>(nearest));
+    for (const std::uint8_t t : regions.triangles_of_point[static_cast<std::size_t>(nearest)]) {
+      if (opposite(side, faces_[t].side)) continue;
+      double sum = 0;
+      for (const std::uint8_t q : faces_[t].points) sum += std::min<double>(distances[q], 10 * es_);
+      if (sum >= best) continue;
+      best = sum;
+      out_.triangle[v] = t;
+      for (int i = 0; i < 3; ++i) out_.barycentric[v][i] = faces_[t].points[i] == nearest ? 1.0 : 0.0;
+    }
+    out_.kind[v] = AssociationKind::geodesic;
+    out_.side[v] = side;
+  }
+
+ private:
+  bool onOtherSide(std::uint32_t v, SlitSide side) const {
+    if (side == SlitSide::none) return false;
+    float own = kUnreached, other = kUnreached;
+    for (std::size_t p = 0; p < kFeaturePointCount; ++p) {
+      const SlitSide of_point = slitSide(p);
+      if (of_point == side) own = std::min(own, out_.point_distance(v, static_cast<Eigen::Index>(p)));
+      if (opposite(of_point, side)) other = std::min(other, out_.point_distance(v, static_cast<Eigen::Index>(p)));
+    }
+    return other < own;
+  }
+
+  bool nearAlongSkin(std::uint32_t v, const MaskFace& face, const Hit& hit) const {
+    const Eigen::Vector3d q = face.a + hit.barycentric[1] * face.ab + hit.barycentric[2] * face.ac;
+    for (const std::uint8_t p : face.points) {
+      const double air = (points_.row(p).transpose() - q).norm();
+      if (out_.point_distance(v, p) > 1.7 * air + 2.0 * hit.distance + 0.05 * es_) return false;
+    }
+    return true;
+  }
+
+  const Mesh& mesh_;
+  const Skin& skin_;
+  const FeaturePointPositions& points_;
+  double es_;
+  std::vector<MaskFace> faces_;
+  SkinAssociation& out_;
+};
+
+}  // namespace
+
+SkinAssociation associateSkin(const Mesh& mesh, const Skin& skin, const std::vector<bool>& is_skin,
+                              const FeaturePointPositions& points, const SkinPoints& on_skin, double eye_separation,
+                              double fade_out) {
+  const std::size_t vertices = mesh.vertexCount();
+  SkinAssociation out;
+  out.triangle.assign(vertices, -1);
+  out.kind.assign(vertices, AssociationKind::outside);
+  out.barycentric.assign(vertices, {0, 0, 0});
+  out.side.assign(vertices, SlitSide::none);
+  out.beyond.assign(vertices, kUnreached);
+  out.point_distance.setConstant(static_cast<Eigen::Index>(vertices), static_cast<Eigen::Index>(kFeaturePointCount),
+                                 kUnreached);
+
+  // Far enough that every vertex of a triangle, and every vertex that fades out, knows its points.
+  double longest_edge = 0;
+  for (const MaskTriangle& t : maskTriangles())
+    for (std::size_t i = 0; i < 3; ++i)
+      longest_edge = std::max(longest_edge, (points.row(t[i]) - points.row(t[(i + 1) % 3])).norm());
+  const auto limit = static_cast<float>(2 * longest_edge + fade_out + eye_separation);
+  for (std::size_t p = 0; p < kFeaturePointCount; ++p) {
+    const GeodesicDistances d = geodesicDistances(skin.graph, on_skin[p].around, limit);
+    for (std::size_t v = 0; v < vertices; ++v)
+      out.point_distance(static_cast<Eigen::Index>(v), static_cast<Eigen::Index>(p)) = d.distance[v];
+  }
+
+  Associator associator(mesh, skin, points, eye_separation, out);
+  std::vector<GeodesicSource> covered;
+  std::vector<std::uint32_t> left;
+  for (std::uint32_t v = 0; v < vertices; ++v) {
+    if (!skin.stands(v) || !is_skin[skin.component[v]]) continue;
+    if (associator.byRay(v))
+      covered.push_back({v, 0.0F});
+    else
+      left.push_back(v);
+  }
+  // The feature points themselves always count as covered, whatever their normals do.
+  for (const SkinPoint& point : on_skin)
+    for (const GeodesicSource& s : point.around)
+      if (out.kind[s.vertex] != AssociationKind::ray) covered.push_back(s);
+  out.beyond = geodesicDistances(skin.graph, covered, static_cast<float>(fade_out)).distance;
+  const RegionsOfInfluence regions = regionsOfInfluence();
+  for (const std::uint32_t v : left)
+    if (out.beyond[v] < kUnreached) associator.byPath(v, regions);
+  return out;
+}
+
+}  // namespace volto::rig

@@ -1,0 +1,48 @@
+// The nearest point of a triangle surface, by a tree of boxes.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "rig/mesh.h"
+
+namespace volto::rig {
+
+struct SurfacePoint {
+  std::int64_t triangle = -1;                  // index into the triangles given; -1: none within the limit
+  std::array<double, 3> barycentric{0, 0, 0};  // >= 0, sum 1
+  double distance = std::numeric_limits<double>::infinity();
+};
+
+// The nearest point of one triangle; a degenerate one counts as its longest edge.
+SurfacePoint closestPointOnTriangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                                    const Eigen::Vector3d& c);
+
+// Reentrant once built. Borrows `positions`, which must outlive it.
+class ClosestPoint {
+ public:
+  ClosestPoint(const VertexPositions& positions, std::vector<std::array<std::uint32_t, 3>> triangles);
+
+  SurfacePoint find(const Eigen::Vector3d& p, double limit = std::numeric_limits<double>::infinity()) const;
+  const std::array<std::uint32_t, 3>& triangle(std::int64_t t) const { return triangles_[static_cast<std::size_t>(t)]; }
+  bool empty() const { return triangles_.empty(); }
+
+ private:
+  struct Node {
+    Eigen::Vector3d low, high;
+    std::uint32_t first = 0, count = 0;  // triangles of a leaf
+    std::uint32_t right = 0;             // second child; the first follows directly
+  };
+  std::uint32_t build(std::uint32_t first, std::uint32_t count, const std::vector<Eigen::Vector3d>& centres);
+
+  const VertexPositions& positions_;
+  std::vector<std::array<std::uint32_t, 3>> triangles_;
+  std::vector<std::uint32_t> order_;
+  std::vector<Node> nodes_;
+};
+
+}  // namespace volto::rig

@@ -1,0 +1,73 @@
+#include "rig/geodesic.h"
+
+#include <algorithm>
+#include <queue>
+#include <tuple>
+
+namespace volto::rig {
+
+EdgeGraph buildEdgeGraph(const Mesh& mesh, std::span<const std::uint32_t> same_as) {
+  std::vector<std::uint64_t> edges;
+  edges.reserve(mesh.corner_vertices.size() * 4);
+  const auto connect = [&edges](std::uint64_t a, std::uint64_t b) {
+    if (a == b) return;
+    edges.push_back(a << 32 | b);
+    edges.push_back(b << 32 | a);
+  };
+  for (std::size_t p = 0; p < mesh.polygonCount(); ++p) {
+    const std::uint32_t first = mesh.polygon_start[p];
+    const std::uint32_t corners = mesh.polygon_start[p + 1] - first;
+    const auto corner = [&](std::uint32_t c) { return same_as[mesh.corner_vertices[first + c % corners]]; };
+    for (std::uint32_t c = 0; c < corners; ++c) connect(corner(c), corner(c + 1));
+    if (corners == 4) {
+      connect(corner(0), corner(2));
+      connect(corner(1), corner(3));
+    }
+  }
+  std::sort(edges.begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+
+  EdgeGraph graph;
+  graph.start.assign(mesh.vertexCount() + 1, 0);
+  graph.neighbour.reserve(edges.size());
+  graph.length.reserve(edges.size());
+  for (const std::uint64_t edge : edges) {
+    const auto a = static_cast<std::uint32_t>(edge >> 32);
+    const auto b = static_cast<std::uint32_t>(edge);
+    ++graph.start[a + 1];
+    graph.neighbour.push_back(b);
+    graph.length.push_back(static_cast<float>((mesh.positions.row(a) - mesh.positions.row(b)).norm()));
+  }
+  for (std::size_t v = 0; v < mesh.vertexCount(); ++v) graph.start[v + 1] += graph.start[v];
+  return graph;
+}
+
+GeodesicDistances geodesicDistances(const EdgeGraph& graph, std::span<const GeodesicSource> sources, float limit) {
+  GeodesicDistances out;
+  out.distance.assign(graph.vertexCount(), kUnreached);
+  out.nearest_source.assign(graph.vertexCount(), -1);
+  using Entry = std::tuple<float, std::int32_t, std::uint32_t>;  // distance, source, vertex
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
+  for (std::size_t s = 0; s < sources.size(); ++s)
+    if (sources[s].distance <= limit)
+      queue.emplace(sources[s].distance, static_cast<std::int32_t>(s), sources[s].vertex);
+  while (!queue.empty()) {
+    const auto [distance, source, v] = queue.top();
+    queue.pop();
+    if (out.nearest_source[v] >= 0) continue;
+    out.distance[v] = distance;
+    out.nearest_source[v] = source;
+    for (std::uint32_t e = graph.start[v]; e < graph.start[v + 1]; ++e) {
+      const float next = distance + graph.length[e];
+      const std::uint32_t u = graph.neighbour[e];
+      if (next <= limit && next < out.distance[u] && out.nearest_source[u] < 0) {
+        out.distance[u] = next;
+        queue.emplace(next, source, u);
+      }
+    }
+  }
+  // What was only looked at, not settled, cannot remain: everything within the limit gets settled.
+  return out;
+}
+
+}  // namespace volto::rig

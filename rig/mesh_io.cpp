@@ -1,0 +1,80 @@
+#include "rig/mesh_io.h"
+
+#include <charconv>
+#include <map>
+#include <stdexcept>
+
+#include "rig/file_bytes.h"
+
+namespace volto::rig {
+namespace {
+
+constexpr std::size_t kMaxMeshFileBytes = std::size_t{256} << 20;
+
+void append(std::string& out, double x) {
+  char digits[32];
+  out.append(digits, std::to_chars(digits, digits + sizeof digits, x).ptr);
+}
+void append(std::string& out, float x) {
+  char digits[32];
+  out.append(digits, std::to_chars(digits, digits + sizeof digits, x).ptr);
+}
+void append(std::string& out, std::size_t x) {
+  char digits[32];
+  out.append(digits, std::to_chars(digits, digits + sizeof digits, x).ptr);
+}
+
+}  // namespace
+
+Mesh readMesh(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  const std::string bytes = readFileBytes(path, kMaxMeshFileBytes);
+  if (extension == ".obj") return parseObj(bytes, path.string());
+  throw InputError(path.string() + ": cannot read '" + extension + "' meshes; give an OBJ file");
+}
+
+std::string formatObj(const Mesh& mesh, const VertexPositions& positions) {
+  if (positions.rows() != mesh.positions.rows())
+    throw std::invalid_argument("formatObj: " + std::to_string(positions.rows()) + " positions for a mesh of " +
+                                std::to_string(mesh.vertexCount()) + " vertices");
+  if (!positions.allFinite()) throw std::invalid_argument("formatObj: a position is not finite");
+  std::string out;
+  out.reserve(mesh.vertexCount() * 48 + mesh.corner_vertices.size() * 8);
+  for (Eigen::Index v = 0; v < positions.rows(); ++v) {
+    out += 'v';
+    for (int axis = 0; axis < 3; ++axis) append(out += ' ', positions(v, axis));
+    out += '\n';
+  }
+  std::vector<std::size_t> corner_texcoord;
+  if (!mesh.corner_texcoords.empty()) {
+    std::map<std::array<float, 2>, std::size_t> numbered;
+    corner_texcoord.reserve(mesh.corner_texcoords.size());
+    for (const auto& uv : mesh.corner_texcoords) {
+      const auto [entry, fresh] = numbered.emplace(uv, numbered.size() + 1);
+      corner_texcoord.push_back(entry->second);
+      if (!fresh) continue;
+      append(out += "vt ", uv[0]);
+      append(out += ' ', uv[1]);
+      out += '\n';
+    }
+  }
+  for (std::size_t p = 0; p < mesh.polygonCount(); ++p) {
+    if (!mesh.polygon_material.empty() && (p == 0 || mesh.polygon_material[p] != mesh.polygon_material[p - 1]))
+      out += "usemtl " + mesh.materials.at(mesh.polygon_material[p]).name + '\n';
+    out += 'f';
+    for (std::uint32_t c = mesh.polygon_start[p]; c < mesh.polygon_start[p + 1]; ++c) {
+      append(out += ' ', static_cast<std::size_t>(mesh.corner_vertices[c]) + 1);
+      if (!corner_texcoord.empty()) append(out += '/', corner_texcoord[c]);
+    }
+    out += '\n';
+  }
+  return out;
+}
+
+void writeObj(const std::filesystem::path& path, const Mesh& mesh, const VertexPositions& positions) {
+  writeFileAtomically(path, formatObj(mesh, positions));
+}
+
+}  // namespace volto::rig

@@ -1,0 +1,465 @@
+#include "rig/rigid_parts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <initializer_list>
+#include <optional>
+#include <string_view>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+
+#include "rig/closest_point.h"
+
+namespace volto::rig {
+namespace {
+
+double smoothStep(double x) {
+  x = std::clamp(x, 0.0, 1.0);
+  return x * x * (3 - 2 * x);
+}
+
+std::size_t pointIndex(std::string_view id) { return featurePointIndex(id).value(); }
+
+// Everything below is measured in the head frame, in eye separations.
+struct Component {
+  std::vector<std::uint32_t> vertices;
+  std::string material;  // lower case
+  Eigen::Vector3d low, high, centre;
+
+  bool named(std::initializer_list<std::string_view> words) const {
+    return std::any_of(words.begin(), words.end(), [this](auto word) { return material.find(word) != material.npos; });
+  }
+};
+
+struct Sphere {
+  Eigen::Vector3d centre;
+  double radius = 0;
+  double roughness = 0;  // rms distance from the sphere, in radii
+  double lean = 1;       // length of the mean direction: 0 a whole sphere, 0.5 half of one, near 1 a small patch
+};
+
+std::optional<Sphere> fitSphere(const VertexPositions& at, const std::vector<std::uint32_t>& vertices) {
+  if (vertices.size() < 12) return std::nullopt;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const std::uint32_t v : vertices) mean += at.row(v).transpose();
+  mean /= static_cast<double>(vertices.size());
+  Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
+  Eigen::Vector4d right = Eigen::Vector4d::Zero();
+  for (const std::uint32_t v : vertices) {
+    Eigen::Vector4d row;
+    row << at.row(v).transpose() - mean, 1.0;
+    normal += row * row.transpose();
+    right += row * row.head<3>().squaredNorm();
+  }
+  normal.diagonal().array() += 1e-12;
+  const Eigen::Vector4d solution = normal.ldlt().solve(right);
+  Sphere s;
+  s.centre = solution.head<3>() / 2 + mean;
+  const double radius2 = solution[3] + solution.head<3>().squaredNorm() / 4;
+  if (!(radius2 > 0) || !s.centre.allFinite()) return std::nullopt;
+  s.radius = std::sqrt(radius2);
+  double error2 = 0;
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
+  for (const std::uint32_t v : vertices) {
+    const Eigen::Vector3d d = at.row(v).transpose() - s.centre;
+    error2 += std::pow(d.norm() - s.radius, 2);
+    direction += d.normalized();
+  }
+  s.roughness = std::sqrt(error2 / static_cast<double>(vertices.size())) / s.radius;
+  s.lean = direction.norm() / static_cast<double>(vertices.size());
+  return s;
+}
+
+class PartPlacer {
+ public:
+  PartPlacer(const Mesh& mesh, const Skin& skin, const std::vector<bool>& is_skin, const HeadPlace& place,
+             SkinAssociation& association, SkinRows& rows)
+      : mesh_(mesh),
+        skin_(skin),
+        is_skin_(is_skin),
+        place_(place),
+        association_(association),
+        rows_(rows),
+        at_((mesh.positions * place.mesh_from_head) / place.eye_separation),
+        points_((place.points * place.mesh_from_head) / place.eye_separation),
+        surface_(at_, skinTriangles()) {
+    mouth_ = (point("2.2") + point("2.3")) / 2;
+    mouth_width_ = std::max((point("8.3") - point("8.4")).norm(), 0.1);
+  }
+
+  std::vector<RigidPart> place() {
+    components_ = components();
+    done_.assign(components_.size(), false);
+    if (components_.empty()) return {};
+    placeEye(RigidPart::Follows::left_eye, "left", (point("3.7") + point("3.11")) / 2);
+    placeEye(RigidPart::Follows::right_eye, "right", (point("3.8") + point("3.12")) / 2);
+    placeMouth();
+    for (std::size_t c = 0; c < components_.size(); ++c)
+      if (!done_[c]) placeOnSkin(components_[c]);
+    return std::move(parts_);
+  }
+
+ private:
+  Eigen::Vector3d point(std::string_view id) const { return points_.row(static_cast<Eigen::Index>(pointIndex(id))); }
+
+  std::vector<std::array<std::uint32_t, 3>> skinTriangles() const {
+    std::vector<std::array<std::uint32_t, 3>> triangles;
+    for (const auto& t : skin_.triangles)
+      if (is_skin_[skin_.component[t[0]]]) triangles.push_back(t);
+    return triangles;
+  }
+
+  std::vector<Component> components() const {
+    std::vector<std::int32_t> slot(is_skin_.size(), -1);
+    std::vector<Component> out;
+    std::vector<bool> used(mesh_.vertexCount(), false);
+    for (const std::uint32_t v : mesh_.corner_vertices) used[v] = true;
+    for (std::uint32_t v = 0; v < mesh_.vertexCount(); ++v) {
+      const std::uint32_t c = skin_.component[v];
+      if (is_skin_[c] || !used[v]) continue;
+      if (slot[c] < 0) {
+        slot[c] = static_cast<std::int32_t>(out.size());
+        out.emplace_back();
+        out.back().low = out.back().high = at_.row(v);
+        out.back().centre.setZero();
+      }
+      Component& part = out[static_cast<std::size_t>(slot[c])];
+      part.vertices.push_back(v);
+      part.low = part.low.cwiseMin(at_.row(v).transpose());
+      part.high = part.high.cwiseMax(at_.row(v).transpose());
+      part.centre += at_.row(v).transpose();
+    }
+    for (Component& part : out) part.centre /= static_cast<double>(part.vertices.size());
+    if (!mesh_.polygon_material.empty())
+      for (std::size_t p = mesh_.polygonCount(); p-- > 0;) {
+        const std::int32_t s = slot[skin_.component[mesh_.corner_vertices[mesh_.polygon_start[p]]]];
+        if (s < 0) continue;
+        std::string name = mesh_.materials[mesh_.polygon_material[p]].name;
+        for (char& ch : name)
+          if (ch >= 'A' && ch <= 'Z') ch = static_cast<char>(ch - 'A' + 'a');
+        out[static_cast<std::size_t>(s)].material = std::move(name);
+      }
+    return out;
+  }
+
+  std::array<double, 3> meshFrame(const Eigen::Vector3d& p) const {
+    const Eigen::Vector3d q = place_.mesh_from_head * p * place_.eye_separation;
+    return {q[0], q[1], q[2]};
+  }
+
+  void setRow(std::uint32_t v, const OperatorRow& row, std::int16_t triangle) {
+    association_.kind[v] = AssociationKind::rigid_part;
+    bool moves = false;
+    for (const double w : row) moves |= w != 0;
+    if (!moves) return;
+    association_.triangle[v] = triangle;
+    rows_.row_of_vertex[v] = static_cast<std::int32_t>(rows_.rows.size());
+    rows_.rows.push_back(row);
+  }
+
+  void addPart(const std::string& name, RigidPart::Follows follows, const Component& part,
+               const Eigen::Vector3d& centre) {
+    RigidPart out;
+    out.name = part.material.empty() ? name : part.material;
+    out.follows = follows;
+    out.vertices = part.vertices;
+    out.centre = meshFrame(centre);
+    for (const std::uint32_t v : part.vertices) association_.kind[v] = AssociationKind::rigid_part;
+    parts_.push_back(std::move(out));
+  }
+
+  // --- eyes
+
+  void placeEye(RigidPart::Follows follows, const std::string& side, const Eigen::Vector3d& eye) {
+    std::optional<Sphere> ball;
+    std::vector<std::optional<Sphere>> spheres(components_.size());
+    for (std::size_t c = 0; c < components_.size(); ++c) {
+      if (done_[c]) continue;
+      const Component& part = components_[c];
+      if (((part.low + part.high) / 2 - eye).norm() > 0.6 || part.named({"lash", "brow", "teeth", "tongue"})) continue;
+      const auto sphere = fitSphere(at_, part.vertices);
+      if (!sphere || sphere->roughness > 0.15 || sphere->radius < 0.08 || sphere->radius > 0.6) continue;
+      const Eigen::Vector3d away = sphere->centre - eye;
+      if (std::abs(away[0]) > 0.4 || std::abs(away[1]) > 0.3 || away[2] > 0.15) continue;
+      const bool round = sphere->lean < 0.7 || (sphere->lean < 0.85 && part.named({"eye"}));
+      if (!round) continue;
+      spheres[c] = sphere;
+      // The largest round thing is the ball; a cornea or a lens belongs to it.
+      if (!ball || sphere->radius * (1 - sphere->lean) > ball->radius * (1 - ball->lean)) ball = sphere;
+    }
+    if (!ball) return;
+    for (std::size_t c = 0; c < components_.size(); ++c) {
+      if (done_[c]) continue;
+      const Component& part = components_[c];
+      bool belongs = spheres[c] && (spheres[c]->centre - ball->centre).norm() < 0.5 * ball->radius;
+      if (!belongs && !part.named({"lash", "brow", "lid"})) {
+        double farthest = 0;
+        for (const std::uint32_t v : part.vertices)
+          farthest = std::max(farthest, (at_.row(v).transpose() - ball->centre).norm());
+        belongs = farthest <
+                  (part.named({"iris", "pupil", "cornea", "lens", "sclera", "eyeball"}) ? 1.2 : 0.99) * ball->radius;
+      }
+      if (!belongs) continue;
+      done_[c] = true;
+      addPart(side + " eyeball", follows, part, ball->centre);
+    }
+  }
+
+  // --- mouth
+
+  bool inMouth(const Component& part) const {
+    const Eigen::Vector3d d = (part.centre - mouth_) / mouth_width_;
+    const bool inside = std::abs(d[0]) < 0.75 && std::abs(d[1]) < 0.8 && d[2] < 0.05 && d[2] > -1.6;
+    const Eigen::Vector3d size = (part.high - part.low) / mouth_width_;
+    if (!inside || size[0] > 2.0 || size[1] > 1.6 || size[2] > 2.6) return false;
+    if (part.named({"teeth", "tooth", "tongue", "gum", "denture", "mouth"})) return true;
+    // Behind the lips: nothing of it lies well in front of them.
+    const double lips = std::max(point("8.1")[2], point("8.2")[2]);
+    return part.high[2] < lips + 0.02 * mouth_width_;
+  }
+
+  // Weights that carry the affine motion which the jaw's points have in the least-squares sense.
+  OperatorRow jawRow(const Eigen::Vector3d& at) const {
+    static constexpr std::array<std::pair<std::string_view, double>, 8> kJaw = {{{"2.1", 1.0},
+                                                                                 {"2.10", 1.0},
+                                                                                 {"2.11", 1.0},
+                                                                                 {"2.12", 1.0},
+                                                                                 {"12.17", 0.7},
+                                                                                 {"12.18", 0.7},
+                                                                                 {"2.13", 0.4},
+                                                                                 {"2.14", 0.4}}};
+    Eigen::Matrix<double, 4, 4> normal = Eigen::Matrix4d::Zero();
+    Eigen::Matrix<double, 4, 8> columns;
+    for (std::size_t i = 0; i < kJaw.size(); ++i) {
+      Eigen::Vector4d b;
+      b << 1.0, point(kJaw[i].first) - mouth_;
+      normal += kJaw[i].second * b * b.transpose();
+      columns.col(static_cast<Eigen::Index>(i)) = kJaw[i].second * b;
+    }
+    normal.diagonal().tail<3>().array() += 0.01;  // points in one plane say nothing of what happens away from it
+    Eigen::Vector4d b;
+    b << 1.0, at - mouth_;
+    const Eigen::Matrix<double, 1, 8> weights = normal.ldlt().solve(b).transpose() * columns;
+    OperatorRow row{};
+    for (std::size_t i = 0; i < kJaw.size(); ++i)
+      row[pointIndex(kJaw[i].first)] = weights[static_cast<Eigen::Index>(i)];
+    return row;
+  }
+
+  void placeMouth() {
+    std::vector<std::size_t> inside;
+    double low = mouth_[1], high = mouth_[1];
+    for (std::size_t c = 0; c < components_.size(); ++c)
+      if (!done_[c] && inMouth(components_[c])) {
+        inside.push_back(c);
+        low = std::min(low, components_[c].low[1]);
+        high = std::max(high, components_[c].high[1]);
+      }
+    if (inside.empty()) return;
+    // Where upper and lower teeth meet: near the slit of the lips, and near the middle of all that is in there.
+    const double split = high - low > 0.35 * mouth_width_ ? 0.25 * mouth_[1] + 0.75 * (high + low) / 2 : mouth_[1];
+
+    std::vector<std::uint32_t> upper_teeth, lower_teeth;
+    std::vector<std::size_t> joined;
+    const auto jaw_triangle =
+        static_cast<std::int16_t>(regionsOfInfluence().triangles_of_point[pointIndex("2.10")].front());
+    for (const std::size_t c : inside) {
+      const Component& part = components_[c];
+      done_[c] = true;
+      const bool both = part.low[1] < split - 0.12 * mouth_width_ && part.high[1] > split + 0.12 * mouth_width_ &&
+                        part.high[1] - part.low[1] > 0.6 * (high - low) && !part.named({"tongue", "upper", "lower"});
+      if (both) {
+        joined.push_back(c);
+        continue;
+      }
+      const Eigen::Vector3d size = part.high - part.low;
+      // A tongue lies along the middle, deeper than wide; it can reach above the lower teeth.
+      const bool tongue = part.named({"tongue"}) ||
+                          (std::abs(part.centre[0] - mouth_[0]) < 0.1 * mouth_width_ && size[2] > 1.2 * size[0] &&
+                           part.vertices.size() > 30 && part.centre[1] < split + 0.1 * mouth_width_);
+      const bool lower = tongue || part.named({"lower"}) || (!part.named({"upper"}) && part.centre[1] < split);
+      auto& teeth = lower ? lower_teeth : upper_teeth;
+      teeth.insert(teeth.end(), part.vertices.begin(), part.vertices.end());
+      addPart(tongue  ? "tongue"
+              : lower ? "lower teeth"
+                      : "upper teeth",
+              lower ? RigidPart::Follows::jaw : RigidPart::Follows::head, part, part.centre);
+      if (lower)
+        for (const std::uint32_t v : part.vertices) setRow(v, jawRow(at_.row(v).transpose()), jaw_triangle);
+    }
+    for (const std::size_t c : joined) placeJoined(components_[c], split, upper_teeth, lower_teeth, jaw_triangle);
+  }
+
+  // Gums of both jaws in one piece: each vertex goes with the teeth it is nearer to, with a smooth passage between.
+  void placeJoined(const Component& part, double split, const std::vector<std::uint32_t>& upper,
+                   const std::vector<std::uint32_t>& lower, std::int16_t jaw_triangle) {
+    addPart("gums and tongue", RigidPart::Follows::jaw, part, part.centre);
+    const auto seeds = [&](const std::vector<std::uint32_t>& teeth) {
+      std::vector<GeodesicSource> out;
+      for (const std::uint32_t v : part.vertices) {
+        if (!skin_.stands(v)) continue;
+        double nearest = 0.04 * mouth_width_;
+        for (const std::uint32_t t : teeth) nearest = std::min(nearest, (at_.row(v) - at_.row(t)).norm());
+        if (nearest < 0.04 * mouth_width_) out.push_back({v, 0.0F});
+      }
+      return out;
+    };
+    const auto upper_seeds = seeds(upper), lower_seeds = seeds(lower);
+    const bool by_teeth = !upper_seeds.empty() && !lower_seeds.empty();
+    const auto to_upper = geodesicDistances(skin_.graph, upper_seeds).distance;
+    const auto to_lower = geodesicDistances(skin_.graph, lower_seeds).distance;
+    for (const std::uint32_t v : part.vertices) {
+      const std::uint32_t s = skin_.same_as[v];
+      double share = 0;
+      if (by_teeth && to_upper[s] < kUnreached && to_lower[s] < kUnreached)
+        share = smoothStep(0.5 + 1.5 * (to_upper[s] / (to_upper[s] + to_lower[s] + 1e-12) - 0.5));
+      else
+        share = smoothStep((split - at_(v, 1)) / (0.3 * mouth_width_) + 0.5);
+      OperatorRow row = jawRow(at_.row(v).transpose());
+      for (double& w : row) w *= share;
+      setRow(v, row, jaw_triangle);
+    }
+  }
+
+  // --- things on the skin
+
+  struct Root {
+    Eigen::Vector3d at;
+    OperatorRow row;
+    std::int16_t triangle;
+  };
+
+  double chainDistance(std::initializer_list<std::string_view> chain, const Eigen::Vector3d& p) const {
+    double best = std::numeric_limits<double>::infinity();
+    for (auto a = chain.begin(), b = a + 1; b != chain.end(); ++a, ++b)
+      best = std::min(best, closestPointOnTriangle(p, point(*a), point(*b), point(*b)).distance);
+    return best;
+  }
+
+  // The lid that a small thing at an eye belongs to: the margin that it is clearly nearer to.
+  SlitSide lidOf(const Component& part) const {
+    double upper_left = 0, lower_left = 0, upper_right = 0, lower_right = 0;
+    for (const std::uint32_t v : part.vertices) {
+      const Eigen::Vector3d p = at_.row(v);
+      upper_left += chainDistance({"3.11", "12.5", "3.1", "12.6", "3.7"}, p);
+      lower_left += chainDistance({"3.11", "12.7", "3.3", "12.8", "3.7"}, p);
+      upper_right += chainDistance({"3.8", "12.9", "3.2", "12.10", "3.12"}, p);
+      lower_right += chainDistance({"3.8", "12.11", "3.4", "12.12", "3.12"}, p);
+    }
+    const bool left = std::min(upper_left, lower_left) < std::min(upper_right, lower_right);
+    const double upper = (left ? upper_left : upper_right) / static_cast<double>(part.vertices.size());
+    const double lower = (left ? lower_left : lower_right) / static_cast<double>(part.vertices.size());
+    if (std::min(upper, lower) > 0.25 || std::max(upper, lower) < 1.25 * std::min(upper, lower)) return SlitSide::none;
+    if (upper < lower) return left ? SlitSide::left_upper_lid : SlitSide::right_upper_lid;
+    return left ? SlitSide::left_lower_lid : SlitSide::right_lower_lid;
+  }
+
+  void placeOnSkin(const Component& part) {
+    constexpr double kReach = 0.35;
+    const bool small = (part.high - part.low).norm() < 0.9;
+    const SlitSide lid = small ? lidOf(part) : SlitSide::none;
+    const ClosestPoint* surface = &surface_;
+    std::optional<ClosestPoint> one_side;
+    if (lid != SlitSide::none) {
+      std::vector<std::array<std::uint32_t, 3>> triangles;
+      for (const auto& t : skinTriangles())
+        if (std::none_of(t.begin(), t.end(), [&](std::uint32_t v) { return opposite(association_.side[v], lid); }))
+          triangles.push_back(t);
+      one_side.emplace(at_, std::move(triangles));
+      surface = &*one_side;
+    }
+    std::vector<SurfacePoint> nearest(part.vertices.size());
+    double closest = kReach;
+    for (std::size_t i = 0; i < part.vertices.size(); ++i) {
+      nearest[i] = surface->find(at_.row(part.vertices[i]).transpose(), kReach);
+      if (nearest[i].triangle >= 0) closest = std::min(closest, nearest[i].distance);
+    }
+    const auto rowAt = [&](const SurfacePoint& on_skin, OperatorRow& row, std::int16_t& triangle) {
+      const auto& corners = surface->triangle(on_skin.triangle);
+      row.fill(0.0);
+      triangle = -1;
+      double most = -1;
+      for (std::size_t k = 0; k < 3; ++k) {
+        if (on_skin.barycentric[k] > most) {
+          most = on_skin.barycentric[k];
+          triangle = association_.triangle[corners[k]];
+        }
+        if (const OperatorRow* of_vertex = rows_.find(corners[k]))
+          for (std::size_t p = 0; p < kFeaturePointCount; ++p) row[p] += on_skin.barycentric[k] * (*of_vertex)[p];
+      }
+    };
+    if (small && closest < 0.1) return placeByRoots(part, nearest, closest, rowAt);
+
+    bool moves = false;
+    for (std::size_t i = 0; i < part.vertices.size(); ++i) {
+      if (nearest[i].triangle < 0) continue;
+      const double share = 1 - smoothStep((nearest[i].distance - 0.02) / (kReach - 0.02));
+      OperatorRow row;
+      std::int16_t triangle = -1;
+      rowAt(nearest[i], row, triangle);
+      for (double& w : row) w *= share;
+      dropSmallWeights(row);
+      setRow(part.vertices[i], row, triangle);
+      moves |= rows_.row_of_vertex[part.vertices[i]] >= 0;
+    }
+    addPart("part " + std::to_string(parts_.size() + 1), moves ? RigidPart::Follows::skin : RigidPart::Follows::head,
+            part, part.centre);
+  }
+
+  template <class RowAt>
+  void placeByRoots(const Component& part, const std::vector<SurfacePoint>& nearest, double closest,
+                    const RowAt& rowAt) {
+    addPart("part " + std::to_string(parts_.size() + 1), RigidPart::Follows::skin, part, part.centre);
+    std::vector<Root> roots;
+    for (std::size_t i = 0; i < part.vertices.size(); ++i)
+      if (nearest[i].triangle >= 0 && nearest[i].distance < closest + 0.015) {
+        Root root{at_.row(part.vertices[i]), {}, -1};
+        rowAt(nearest[i], root.row, root.triangle);
+        roots.push_back(std::move(root));
+      }
+    for (std::size_t i = 0; i < part.vertices.size(); ++i) {
+      const Eigen::Vector3d p = at_.row(part.vertices[i]);
+      OperatorRow row{};
+      double total = 0, nearest_root = std::numeric_limits<double>::infinity();
+      std::int16_t triangle = -1;
+      for (const Root& root : roots) {
+        const double distance2 = (root.at - p).squaredNorm();
+        const double share = 1 / std::pow(distance2 + 1e-6, 2);
+        total += share;
+        for (std::size_t q = 0; q < kFeaturePointCount; ++q) row[q] += share * root.row[q];
+        if (distance2 < nearest_root) {
+          nearest_root = distance2;
+          triangle = root.triangle;
+        }
+      }
+      for (double& w : row) w /= total;
+      dropSmallWeights(row);
+      setRow(part.vertices[i], row, triangle);
+    }
+  }
+
+  const Mesh& mesh_;
+  const Skin& skin_;
+  const std::vector<bool>& is_skin_;
+  const HeadPlace& place_;
+  SkinAssociation& association_;
+  SkinRows& rows_;
+  VertexPositions at_;
+  FeaturePointPositions points_;
+  ClosestPoint surface_;
+  Eigen::Vector3d mouth_;
+  double mouth_width_ = 1;
+  std::vector<Component> components_;
+  std::vector<bool> done_;
+  std::vector<RigidPart> parts_;
+};
+
+}  // namespace
+
+std::vector<RigidPart> placeParts(const Mesh& mesh, const Skin& skin, const std::vector<bool>& is_skin,
+                                  const HeadPlace& place, SkinAssociation& association, SkinRows& rows) {
+  return PartPlacer(mesh, skin, is_skin, place, association, rows).place();
+}
+
+}  // namespace volto::rig

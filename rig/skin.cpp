@@ -1,0 +1,109 @@
+#include "rig/skin.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Geometry>
+
+namespace volto::rig {
+namespace {
+
+// Position of the edge a -> b in the graph's arrays.
+std::size_t edgeIndex(const EdgeGraph& graph, std::uint32_t a, std::uint32_t b) {
+  const auto first = graph.neighbour.begin() + graph.start[a], last = graph.neighbour.begin() + graph.start[a + 1];
+  const auto found = std::lower_bound(first, last, b);
+  return found != last && *found == b ? static_cast<std::size_t>(found - graph.neighbour.begin())
+                                      : graph.neighbour.size();
+}
+
+class LaplaceAssembly {
+ public:
+  LaplaceAssembly(const Mesh& mesh, Skin& skin) : mesh_(mesh), skin_(skin) {}
+
+  void addTriangle(std::uint32_t a, std::uint32_t b, std::uint32_t c, double share) {
+    if (a == b || b == c || c == a) return;
+    const Eigen::Vector3d pa = mesh_.positions.row(a), pb = mesh_.positions.row(b), pc = mesh_.positions.row(c);
+    const Eigen::Vector3d cross = (pb - pa).cross(pc - pa);
+    const double twice_area = cross.norm();
+    if (!(twice_area > 0)) return;
+    for (const std::uint32_t v : {a, b, c}) {
+      skin_.normals.row(v) += share * cross.transpose();
+      skin_.area[v] += share * twice_area / 6;
+    }
+    addEdge(b, c, share * 0.5 * (pb - pa).dot(pc - pa) / twice_area);
+    addEdge(c, a, share * 0.5 * (pc - pb).dot(pa - pb) / twice_area);
+    addEdge(a, b, share * 0.5 * (pa - pc).dot(pb - pc) / twice_area);
+  }
+
+ private:
+  void addEdge(std::uint32_t a, std::uint32_t b, double weight) {
+    const std::size_t ab = edgeIndex(skin_.graph, a, b), ba = edgeIndex(skin_.graph, b, a);
+    if (ab >= skin_.laplacian.size() || ba >= skin_.laplacian.size())
+      return;  // an inner edge of a polygon with many corners
+    skin_.laplacian[ab] += weight;
+    skin_.laplacian[ba] += weight;
+  }
+  const Mesh& mesh_;
+  Skin& skin_;
+};
+
+}  // namespace
+
+Skin prepareSkin(const Mesh& mesh, std::vector<std::uint32_t> same_as) {
+  Skin skin;
+  skin.same_as = std::move(same_as);
+  skin.graph = buildEdgeGraph(mesh, skin.same_as);
+  const std::size_t vertices = mesh.vertexCount();
+  skin.normals = VertexPositions::Zero(mesh.positions.rows(), 3);
+  skin.area.assign(vertices, 0.0);
+  skin.laplacian.assign(skin.graph.neighbour.size(), 0.0);
+
+  LaplaceAssembly assembly(mesh, skin);
+  for (std::size_t p = 0; p < mesh.polygonCount(); ++p) {
+    const std::uint32_t first = mesh.polygon_start[p];
+    const std::uint32_t corners = mesh.polygon_start[p + 1] - first;
+    const auto corner = [&](std::uint32_t c) { return skin.same_as[mesh.corner_vertices[first + c % corners]]; };
+    if (corners == 4) {
+      for (std::uint32_t c = 0; c < 4; ++c) assembly.addTriangle(corner(c), corner(c + 1), corner(c + 2), 0.5);
+    } else {
+      for (std::uint32_t c = 2; c < corners; ++c) assembly.addTriangle(corner(0), corner(c - 1), corner(c), 1.0);
+    }
+  }
+  for (double& weight : skin.laplacian) weight = std::clamp(weight, 0.02, 20.0);
+  for (std::uint32_t v = 0; v < vertices; ++v) {
+    const double length = skin.normals.row(v).norm();
+    if (length > 0) skin.normals.row(v) /= length;
+  }
+
+  skin.component.assign(vertices, 0);
+  std::vector<bool> seen(vertices, false);
+  std::vector<std::uint32_t> stack;
+  std::uint32_t next = 0;
+  for (std::uint32_t v = 0; v < vertices; ++v) {
+    if (!skin.stands(v)) {
+      skin.component[v] = skin.component[skin.same_as[v]];
+      continue;
+    }
+    if (seen[v]) continue;
+    stack.assign(1, v);
+    seen[v] = true;
+    while (!stack.empty()) {
+      const std::uint32_t u = stack.back();
+      stack.pop_back();
+      skin.component[u] = next;
+      for (std::uint32_t e = skin.graph.start[u]; e < skin.graph.start[u + 1]; ++e)
+        if (!seen[skin.graph.neighbour[e]]) {
+          seen[skin.graph.neighbour[e]] = true;
+          stack.push_back(skin.graph.neighbour[e]);
+        }
+    }
+    ++next;
+  }
+  for (auto t : triangulate(mesh)) {
+    for (std::uint32_t& v : t) v = skin.same_as[v];
+    if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) skin.triangles.push_back(t);
+  }
+  return skin;
+}
+
+}  // namespace volto::rig
