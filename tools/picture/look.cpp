@@ -1,0 +1,206 @@
+#include "tools/picture/look.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+namespace volto::picture {
+namespace {
+
+// Listed so that the more telling part of a name comes first: "eye_white" before "eye", "eyelashes" before "eye".
+struct Known {
+  std::string_view part;
+  Surface surface;
+};
+
+const Vec3 kSkin{0.58F, 0.33F, 0.235F};
+
+const std::array<Known, 28>& knownSurfaces() {
+  static const std::array<Known, 28> known{{
+      {"lacrimal", {"lacrimal", {0.6F, 0.4F, 0.35F}, 0.05F, 200.0F, 0.0F, false}},
+      {"tear", {"tear", {0.6F, 0.4F, 0.35F}, 0.05F, 200.0F, 0.0F, false}},
+      {"occlusion", {"occlusion", {0.1F, 0.08F, 0.08F}, 0.0F, 8.0F, 0.0F, false}},
+      {"cornea", {"cornea", {0.9F, 0.9F, 0.9F}, 0.05F, 300.0F, 0.0F, false}},
+      {"lash", {"eyelashes", {0.022F, 0.016F, 0.013F}, 0.02F, 30.0F}},
+      {"brow", {"eyebrows", {0.085F, 0.045F, 0.027F}, 0.02F, 20.0F, 0.3F}},
+      {"eyelid", {"skin", kSkin, 0.028F, 22.0F, 1.0F}},
+      {"iris", {"iris", {0.10F, 0.17F, 0.22F}, 0.05F, 220.0F}},
+      {"pupil", {"pupil", {0.004F, 0.004F, 0.004F}, 0.05F, 260.0F}},
+      {"eye_white", {"eye_white", {0.74F, 0.71F, 0.69F}, 0.05F, 220.0F, 0.3F}},
+      {"eyewhite", {"eye_white", {0.74F, 0.71F, 0.69F}, 0.05F, 220.0F, 0.3F}},
+      {"sclera", {"eye_white", {0.74F, 0.71F, 0.69F}, 0.05F, 220.0F, 0.3F}},
+      {"eyeball", {"eye_white", {0.74F, 0.71F, 0.69F}, 0.05F, 220.0F, 0.3F}},
+      {"socket", {"socket", {0.30F, 0.13F, 0.10F}, 0.03F, 30.0F, 0.6F}},
+      {"caruncle", {"caruncle", {0.55F, 0.22F, 0.19F}, 0.05F, 120.0F, 1.0F}},
+      {"teeth", {"teeth", {0.72F, 0.66F, 0.55F}, 0.05F, 120.0F, 0.4F}},
+      {"tooth", {"teeth", {0.72F, 0.66F, 0.55F}, 0.05F, 120.0F, 0.4F}},
+      {"gum", {"gums", {0.45F, 0.14F, 0.13F}, 0.05F, 90.0F, 0.8F}},
+      {"tongue", {"tongue", {0.47F, 0.15F, 0.14F}, 0.05F, 70.0F, 0.9F}},
+      {"lip", {"lips", {0.49F, 0.165F, 0.135F}, 0.038F, 42.0F, 1.0F}},
+      {"mouth", {"mouth", {0.20F, 0.05F, 0.045F}, 0.03F, 40.0F, 0.6F}},
+      {"hair", {"hair", {0.07F, 0.04F, 0.025F}, 0.03F, 40.0F, 0.0F}},
+      {"cloth", {"cloth", {0.05F, 0.06F, 0.08F}, 0.02F, 10.0F, 0.0F}},
+      {"shirt", {"cloth", {0.05F, 0.06F, 0.08F}, 0.02F, 10.0F, 0.0F}},
+      {"horn", {"horn", {0.25F, 0.20F, 0.15F}, 0.04F, 40.0F, 0.2F}},
+      {"metal", {"metal", {0.4F, 0.4F, 0.42F}, 0.5F, 60.0F, 0.0F}},
+      {"skin", {"skin", kSkin, 0.028F, 22.0F, 1.0F}},
+      {"eye", {"eye_white", {0.74F, 0.71F, 0.69F}, 0.05F, 220.0F, 0.3F}},
+  }};
+  return known;
+}
+
+Vec3 position(const rig::Mesh& mesh, std::uint32_t vertex) {
+  const auto row = mesh.positions.row(vertex);
+  return {static_cast<float>(row.x()), static_cast<float>(row.y()), static_cast<float>(row.z())};
+}
+
+// A separate piece of the mesh.
+struct Component {
+  std::vector<std::uint32_t> vertices;
+  Vec3 low{1e30F, 1e30F, 1e30F}, high{-1e30F, -1e30F, -1e30F};
+  Vec3 centre;  // of the fitted sphere
+  float radius = 0.0F;
+  bool ball = false;  // round all over, or nearly
+};
+
+// Least squares sphere (|p|^2 = 2 c.p + k), solved by Cramer's rule on the 4 by 4 normal equations in double.
+void fitSphere(const rig::Mesh& mesh, Component& part) {
+  double mean[3]{};
+  for (const std::uint32_t v : part.vertices) {
+    for (int a = 0; a < 3; ++a) mean[a] += mesh.positions(v, a);
+  }
+  const auto n = static_cast<double>(part.vertices.size());
+  for (double& m : mean) m /= n;
+  double m[3][3]{}, right[3]{};
+  double mean_square = 0.0;
+  for (const std::uint32_t v : part.vertices) {
+    for (int a = 0; a < 3; ++a) mean_square += std::pow(mesh.positions(v, a) - mean[a], 2) / n;
+  }
+  for (const std::uint32_t v : part.vertices) {
+    double d[3], square = 0.0;
+    for (int a = 0; a < 3; ++a) d[a] = mesh.positions(v, a) - mean[a], square += d[a] * d[a];
+    for (int a = 0; a < 3; ++a) {
+      for (int b = 0; b < 3; ++b) m[a][b] += 2.0 * d[a] * d[b];
+      right[a] += d[a] * (square - mean_square);
+    }
+  }
+  const auto determinant = [](const double(&q)[3][3]) {
+    return q[0][0] * (q[1][1] * q[2][2] - q[1][2] * q[2][1]) - q[0][1] * (q[1][0] * q[2][2] - q[1][2] * q[2][0]) +
+           q[0][2] * (q[1][0] * q[2][1] - q[1][1] * q[2][0]);
+  };
+  const double whole = determinant(m);
+  if (!(std::abs(whole) > 1e-30)) return;
+  double centre[3];
+  for (int a = 0; a < 3; ++a) {
+    double replaced[3][3];
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) replaced[i][j] = j == a ? right[i] : m[i][j];
+    }
+    centre[a] = determinant(replaced) / whole + mean[a];
+  }
+  double sum = 0.0, square_sum = 0.0;
+  int octants = 0;
+  for (const std::uint32_t v : part.vertices) {
+    double square = 0.0;
+    int octant = 0;
+    for (int a = 0; a < 3; ++a) {
+      const double d = mesh.positions(v, a) - centre[a];
+      square += d * d;
+      octant |= (d > 0.0 ? 1 : 0) << a;
+    }
+    octants |= 1 << octant;
+    const double distance = std::sqrt(square);
+    sum += distance;
+    square_sum += distance * distance;
+  }
+  const double radius = sum / n, spread = std::sqrt(std::max(0.0, square_sum / n - radius * radius));
+  part.centre = {static_cast<float>(centre[0]), static_cast<float>(centre[1]), static_cast<float>(centre[2])};
+  part.radius = static_cast<float>(radius);
+  part.ball = octants == 255 && spread < 0.08 * radius;
+}
+
+// Parts of a mesh without materials, told by their shape.
+Look lookByShape(const rig::Mesh& mesh) {
+  Look look;
+  look.surfaces = {surfaceByName("skin"), surfaceByName("eyeball"), surfaceByName("tear"), surfaceByName("teeth")};
+  look.polygon_surface.assign(mesh.polygonCount(), 0);
+  const std::vector<std::uint32_t> component = rig::connectedComponents(mesh);
+  std::vector<Component> parts;
+  for (std::uint32_t v = 0; v < component.size(); ++v) {
+    if (component[v] >= parts.size()) parts.resize(component[v] + 1U);
+    Component& part = parts[component[v]];
+    const Vec3 p = position(mesh, v);
+    if (!std::isfinite(p.x + p.y + p.z)) continue;
+    part.vertices.push_back(v);
+    part.low = {std::min(part.low.x, p.x), std::min(part.low.y, p.y), std::min(part.low.z, p.z)};
+    part.high = {std::max(part.high.x, p.x), std::max(part.high.y, p.y), std::max(part.high.z, p.z)};
+  }
+  if (parts.empty()) return look;
+  const auto size = [](const Component& part) { return part.vertices.empty() ? 0.0F : length(part.high - part.low); };
+  const float head = size(*std::max_element(parts.begin(), parts.end(),
+                                            [&](const Component& a, const Component& b) { return size(a) < size(b); }));
+  std::vector<std::uint16_t> surface_of(parts.size(), 0);
+  std::vector<std::size_t> balls;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (parts[i].vertices.size() < 24 || size(parts[i]) > 0.4F * head) continue;
+    fitSphere(mesh, parts[i]);
+    if (parts[i].ball && parts[i].radius > 0.01F * head) balls.push_back(i);
+  }
+  for (const std::size_t i : balls) {
+    Surface eye = surfaceByName("eyeball");
+    eye.eyeball = static_cast<int>(look.eyeballs.size());
+    look.eyeballs.push_back({parts[i].centre, {0.0F, 0.0F, 1.0F}});
+    surface_of[i] = static_cast<std::uint16_t>(look.surfaces.size());
+    look.surfaces.push_back(eye);
+  }
+  // A film over an eyeball (tear fluid, painted shadow) would hide it: no point of it is far from the ball's surface.
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (surface_of[i] != 0 || parts[i].vertices.empty()) continue;
+    for (const std::size_t ball : balls) {
+      bool film = true;
+      for (const std::uint32_t v : parts[i].vertices) {
+        const float distance = length(position(mesh, v) - parts[ball].centre) / parts[ball].radius;
+        film = film && distance > 0.85F && distance < 1.25F;
+        if (!film) break;
+      }
+      if (film) surface_of[i] = 2;
+    }
+  }
+  for (std::size_t p = 0; p < mesh.polygonCount(); ++p) {
+    look.polygon_surface[p] = surface_of[component[mesh.corner_vertices[mesh.polygon_start[p]]]];
+  }
+  return look;
+}
+
+}  // namespace
+
+Surface surfaceByName(std::string_view name) {
+  std::string lower(name);
+  for (char& c : lower) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  for (const Known& known : knownSurfaces()) {
+    if (lower.find(known.part) != std::string::npos) return known.surface;
+  }
+  return {"skin", kSkin, 0.028F, 22.0F, 1.0F};
+}
+
+Look lookOf(const rig::Mesh& mesh) {
+  if (mesh.materials.empty() || mesh.polygon_material.size() != mesh.polygonCount()) return lookByShape(mesh);
+  Look look;
+  const std::array<float, 3> unset = rig::Mesh::Material{}.colour;
+  for (const auto& material : mesh.materials) {
+    Surface surface = surfaceByName(material.name);
+    surface.name = material.name;
+    if (material.colour != unset) surface.albedo = {material.colour[0], material.colour[1], material.colour[2]};
+    look.surfaces.push_back(surface);
+  }
+  look.polygon_surface.reserve(mesh.polygonCount());
+  for (const std::uint32_t index : mesh.polygon_material) {
+    look.polygon_surface.push_back(static_cast<std::uint16_t>(index < mesh.materials.size() ? index : 0));
+  }
+  return look;
+}
+
+}  // namespace volto::picture
