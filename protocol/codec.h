@@ -62,7 +62,21 @@ std::optional<MessageKind> messageKind(Bytes bytes);
 // The stamp alone, of any message; runs the whole Verifier (so the bytes are well formed) but not the semantic checks.
 Result decodeStamp(Bytes bytes, Stamp& out);
 
-// All that decode would check, for a reader that only passes bytes on.
-Result checkMessage(Bytes bytes);
+// All that decode would check, for those who pass bytes on without looking at the frame (Subscriber, takes).
+// Thread-bound; reuses memory.
+class Inspector {
+ public:
+  Result check(Bytes bytes, Stamp& stamp);
+
+ private:
+  LandmarkMessage landmarks_;
+  MaskMessage mask_;
+  AvatarMessage avatar_;
+  CharacterMessage character_;
+  StatusMessage status_;
+};
+
+// The same for one message.
+Result checkMessage(Bytes bytes, Stamp& stamp);
 
 }  // namespace volto::protocol

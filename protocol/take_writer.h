@@ -51,7 +51,7 @@ class TakeWriter {
  public:
   // Creates the file. Throws SetupError: failed (exists, cannot be made).
   TakeWriter(const std::string& path, const TakeHeader& header, const TakeWriterOptions& options = {});
-  // As finish(), its Result ignored.
+  // As finish(), its Result ignored. A reproducible take that was not finished is thrown away.
   ~TakeWriter();
   TakeWriter(const TakeWriter&) = delete;
   TakeWriter& operator=(const TakeWriter&) = delete;
@@ -62,11 +62,13 @@ class TakeWriter {
   // The same for a message that checkMessage has already accepted, as a Subscriber's has.
   Result appendChecked(std::string_view topic, const Stamp& stamp, Bytes payload);
 
-  // Encodes and appends; seq counts per topic from 1.
+  // Encodes and appends; seq counts per topic from 1, t_publish_ns is t_capture_ns. A name that is none throws
+  // SetupError (makeTopic).
   Result append(const LandmarkFrame& frame, std::string_view source_name);
   Result append(const MaskFrame& frame, std::string_view source_name);
   Result append(const Character& character);
-  Result append(const AvatarFrame& frame, const Character& character);  // weights, and mesh when it has vertices
+  // weights/, and mesh/ when it has vertices. character_id: characterId of the character that was appended.
+  Result append(const AvatarFrame& frame, std::string_view character_name, std::uint64_t character_id);
 
   // Writes what waits, leaves one clean file behind (no -wal), stops. Not ok: what went wrong, also earlier; the file
   // holds counters().committed.
