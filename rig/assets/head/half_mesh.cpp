@@ -131,6 +131,12 @@ class CageBuilder {
   static bool inMouth(int r, int c) { return r >= kMouthTop && r < kMouthBottom && c < kMouthOuter; }
   static bool inNostril(int r, int c) { return r == kNostrilRow && c == kNostrilColumn; }
   static bool inEar(int r, int c) { return r >= kEarTop && r < kEarBottom && c >= kEarFront && c < kEarBehind; }
+  // Close-cropped hair: over the forehead, down before and behind the ear, to the nape.
+  static Material gridMaterial(int r, int c) {
+    const bool hair = r < 1 || (r == 1 && c >= 7) || (r >= 2 && r <= 4 && c >= kEarFront - 1) ||
+                      (r <= kEarBottom + 1 && c >= kEarBehind);
+    return hair ? Material::hair : Material::skin;
+  }
   // Strictly inside a block: no grid vertex there.
   static bool insideBlock(int r, int c) {
     return (r > kEyeTop && r < kEyeBottom && c > kEyeInner && c < kEyeOuter) ||
@@ -149,7 +155,7 @@ class CageBuilder {
     for (int r = 0; r < kRows; ++r)
       for (int c = 0; c < kColumns; ++c)
         if (!inEye(r, c) && !inMouth(r, c) && !inNostril(r, c) && !inEar(r, c))
-          addPolygon({grid(r, c), grid(r + 1, c), grid(r + 1, c + 1), grid(r, c + 1)}, Material::skin);
+          addPolygon({grid(r, c), grid(r + 1, c), grid(r + 1, c + 1), grid(r, c + 1)}, gridMaterial(r, c));
   }
 
   // The uppermost row closed by a patch of quads: 3 to the side, the others from front to back.
@@ -180,7 +186,7 @@ class CageBuilder {
       }
     for (std::size_t a = 0; a < kAlong; ++a)
       for (std::size_t s = 0; s < kAcross; ++s)
-        addPolygon({cap[a][s], cap[a][s + 1], cap[a + 1][s + 1], cap[a + 1][s]}, Material::skin);
+        addPolygon({cap[a][s], cap[a][s + 1], cap[a + 1][s + 1], cap[a + 1][s]}, Material::hair);
     // (Seen from above the front row comes first and the side grows to the left: counter-clockwise is front, side,
     // back.)
   }
@@ -274,6 +280,9 @@ class CageBuilder {
     for (double ring = kEarRoot; ring <= kEarFloor; ring += 1)
       rings.push_back(stripRing(Strip::ear, ring, kEarAround, false));
     for (std::size_t k = 0; k + 1 < rings.size(); ++k) joinRings(rings[k], rings[k + 1], true, Material::skin);
+    // Hair above and behind the ear, down to where it leaves the head.
+    const std::size_t first = mesh_.polygons.size() - (rings.size() - 1) * kEarAround;
+    for (std::size_t i = 1; i < 7; ++i) mesh_.polygons[first + i].material = Material::hair;
     const auto& f = rings.back();
     // Cap: a ladder from front to back.
     addPolygon({f[0], f[11], f[1]}, Material::skin);
@@ -359,6 +368,36 @@ HalfMesh split(const HalfMesh& coarse) {
   return fine;
 }
 
+void raiseHair(HalfMesh& mesh, double thickness) {
+  // Rings of vertices inward from the hair line.
+  constexpr int kRamp = 6;
+  std::vector<int> depth(mesh.vertices.size(), kRamp);
+  for (const Polygon& polygon : mesh.polygons)
+    if (polygon.material != Material::hair)
+      for (const int c : polygon.corners) depth[static_cast<std::size_t>(c)] = 0;
+  for (int level = 0; level + 1 < kRamp; ++level)
+    for (const Polygon& polygon : mesh.polygons) {
+      bool touches = false;
+      for (const int c : polygon.corners) touches = touches || depth[static_cast<std::size_t>(c)] == level;
+      if (!touches) continue;
+      for (const int c : polygon.corners) {
+        int& d = depth[static_cast<std::size_t>(c)];
+        if (d > level + 1) d = level + 1;
+      }
+    }
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    if (depth[i] == 0) continue;
+    HalfVertex& v = mesh.vertices[i];
+    const double t = static_cast<double>(depth[i]) / kRamp;
+    Vec3 normal = normalized(skinGradient(v.position));
+    if (v.midline) normal.x = 0;
+    // Thinner where the ear stands in the way.
+    const double z = (v.position.z + 0.1) / 2.0, y = (v.position.y + 1.65) / 3.2;
+    const double near_ear = v.position.x > 4 ? 1 - smoothstep(0.95, 1.6, std::sqrt(y * y + z * z)) : 0;
+    v.position = v.position + normal * (thickness * (1 - 0.8 * near_ear) * std::sqrt(t * (2 - t)));
+  }
+}
+
 void relax(HalfMesh& mesh, int rounds, double strength) {
   const std::size_t n = mesh.vertices.size();
   std::vector<std::vector<int>> neighbours(n);
@@ -370,6 +409,21 @@ void relax(HalfMesh& mesh, int rounds, double strength) {
       if (std::find(na.begin(), na.end(), b) == na.end()) na.push_back(b);
       if (std::find(nb.begin(), nb.end(), a) == nb.end()) nb.push_back(a);
     }
+  // The hair line is evened out along itself, which rounds the corners that it has on the coarse mesh.
+  std::vector<std::vector<int>> along_hair(n);
+  {
+    std::unordered_map<std::uint64_t, int> sides;  // hair polygons counted up, others down
+    const auto key = [](int a, int b) {
+      return (static_cast<std::uint64_t>(std::min(a, b)) << 32) | static_cast<std::uint64_t>(std::max(a, b));
+    };
+    for (const Polygon& polygon : mesh.polygons)
+      for (std::size_t i = 0; i < polygon.corners.size(); ++i)
+        sides[key(polygon.corners[i], polygon.corners[(i + 1) % polygon.corners.size()])] +=
+            polygon.material == Material::hair ? 1 : 3;
+    for (std::size_t i = 0; i < n; ++i)
+      for (const int j : neighbours[i])
+        if (sides[key(static_cast<int>(i), j)] == 4) along_hair[i].push_back(j);
+  }
   std::vector<Vec3> next(n);
   for (int round = 0; round <= rounds; ++round) {
     for (std::size_t i = 0; i < n; ++i) {
@@ -379,7 +433,7 @@ void relax(HalfMesh& mesh, int rounds, double strength) {
       if (round > 0) {
         Vec3 sum;
         double weight = 0;
-        for (const int j : neighbours[i]) {
+        for (const int j : along_hair[i].empty() ? neighbours[i] : along_hair[i]) {
           const HalfVertex& other = mesh.vertices[static_cast<std::size_t>(j)];
           if (v.border && !other.border) continue;
           // On the midline the mirrored neighbour pulls as much as the one we have.

@@ -26,6 +26,7 @@ struct HalfVertex {
 
 enum class Material : unsigned char {
   skin,
+  hair,
   lips,
   mouth,
   nostril,
@@ -59,6 +60,9 @@ HalfMesh makeCage();
 // Splits every polygon into quads, one per corner (the topology of Catmull and Clark); new strip vertices get their
 // strip coordinates.
 HalfMesh split(const HalfMesh& coarse);
+
+// Raises the hair off the skull by up to `thickness`, ramping up from the hair line.
+void raiseHair(HalfMesh& mesh, double thickness);
 
 // Evens out the skin vertices: each moves toward the middle of its neighbours by `strength` and back onto the field.
 void relax(HalfMesh& mesh, int rounds, double strength);

@@ -23,6 +23,8 @@ std::string materialName(Material material) {
   switch (material) {
     case Material::skin:
       return "skin";
+    case Material::hair:
+      return "hair";
     case Material::lips:
       return "lips";
     case Material::mouth:
@@ -59,6 +61,8 @@ std::array<double, 3> materialColour(Material material) {
   switch (material) {
     case Material::skin:
       return {0.72, 0.47, 0.36};
+    case Material::hair:
+      return {0.085, 0.05, 0.036};
     case Material::lips:
       return {0.58, 0.24, 0.22};
     case Material::mouth:

@@ -90,10 +90,10 @@ constexpr SkinPlace kOnSkin[] = {
     {"10.9", "10.10", {7.0, 0.35, 1.35}, false},
     {"3.9", "3.10", {3.1, -1.15, 0}, true},
     {"3.13", "3.14", {3.15, 1.02, 0}, true},
-    {"4.1", "4.2", {1.2, 1.93, 0}, true},
+    {"4.1", "4.2", {1.2, 2.04, 0}, true},
     {"4.3", "4.4", {3.6, 2.46, 0}, true},
-    {"4.5", "4.6", {5.1, 1.82, 0}, true},
-    {"12.1", "12.3", {2.4, 2.32, 0}, true},
+    {"4.5", "4.6", {5.05, 1.85, 0}, true},
+    {"12.1", "12.3", {2.4, 2.34, 0}, true},
     {"12.2", "12.4", {4.4, 2.37, 0}, true},
     {"5.1", "5.2", {4.2, -4.1, 0}, true},
     {"5.3", "5.4", {4.9, -1.9, 0}, true},
@@ -106,8 +106,8 @@ constexpr SkinPlace kOnSkin[] = {
     {"9.12", "", {0, -2.35, 0}, true},
     {"12.13", "", {0, 0.45, 0}, true},
     {"12.14", "", {0, -0.95, 0}, true},
-    {"11.1", "", {0, 7.3, 0}, true},
-    {"11.3", "11.2", {4.7, 6.2, 0}, true},
+    {"11.1", "", {0, 6.5, 0}, true},
+    {"11.3", "11.2", {4.75, 5.35, 0}, true},
 };
 
 void placeFeaturePoints(Head& head, const HalfMesh& skin) {
@@ -157,11 +157,12 @@ void placeFeaturePoints(Head& head, const HalfMesh& skin) {
 
 Head makeHead() {
   HalfMesh skin = makeCage();
-  relax(skin, 6, 0.5);
+  relax(skin, 8, 0.5);
   skin = split(skin);
-  relax(skin, 6, 0.5);
+  relax(skin, 8, 0.5);
   skin = split(skin);
-  relax(skin, 5, 0.5);
+  relax(skin, 8, 0.5);
+  raiseHair(skin, 0.24);
 
   Head head;
   append(head, skin, "skin");  // first, so that a vertex of the left half keeps its number

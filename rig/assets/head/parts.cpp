@@ -201,7 +201,7 @@ HalfMesh makeUpperLashes() {
     const double around = lerp(0.9, 8.0, t);
     const Vec3 root = lidMargin(around);
     const Vec3 out = normalized(root - kEyeCentre);
-    const double reach = 0.05 + 0.26 * smoothstep(0.0, 0.75, t) * (1 - 0.55 * smoothstep(0.93, 1.0, t));
+    const double reach = 0.04 + 0.22 * smoothstep(0.0, 0.75, t) * (1 - 0.85 * smoothstep(0.84, 1.0, t));
     const Vec3 sideways{0.35 * (t - 0.35), 0, 0};
     const Vec3 forward = normalized(out + sideways + Vec3{0, 0.12, 0});
     Vec3 p = root - out * 0.015;
@@ -223,8 +223,8 @@ HalfMesh makeUpperLashes() {
 Vec3 browLine(double t) {
   // Quadratic through the inner end, the peak and the outer end.
   const double x = lerp(1.05, 5.15, t);
-  const double y =
-      t < 0.66 ? lerp(1.88, 2.46, std::sin(t / 0.66 * kPi / 2)) : 2.46 - 0.72 * (t - 0.66) * (t - 0.66) / (0.34 * 0.34);
+  const double past = (t - 0.64) / 0.36;
+  const double y = t < 0.64 ? lerp(2.00, 2.46, std::sin(t / 0.64 * kPi / 2)) : 2.46 - 0.66 * past * past;
   return castToSkin({x, y, 16}, {0, 0, -1});
 }
 

@@ -37,8 +37,8 @@ double wrappedSpline(const double (&knots)[N], double t) {
 // Palpebral fissure relative to the eyeball's centre, 16 knots around from the inner corner over the upper lid.
 constexpr double kFissureX[16] = {-1.50, -1.22, -0.82, -0.38, 0.06, 0.50,  0.90,  1.22,
                                   1.44,  1.24,  0.94,  0.54,  0.08, -0.40, -0.84, -1.22};
-constexpr double kFissureY[16] = {-0.17, 0.12,  0.37,  0.52,  0.58,  0.56,  0.46,  0.29,
-                                  0.05,  -0.17, -0.35, -0.47, -0.52, -0.50, -0.43, -0.31};
+constexpr double kFissureY[16] = {-0.18, 0.10,  0.33,  0.47,  0.52,  0.51,  0.43,  0.27,
+                                  0.04,  -0.18, -0.35, -0.47, -0.52, -0.50, -0.43, -0.32};
 
 Vec3 onLidSphere(double x, double y, double radius) {
   const double flat = x * x + y * y;
@@ -56,7 +56,11 @@ Vec3 eyePoint(double ring, double around) {
   const Vec3 back = front * inner;
   if (ring <= kLidMarginBack) return kEyeCentre + lerp(front, back, clamp01(ring - kLidMarginFront));
   // Behind the lids: along the eyeball, away from the opening.
-  const Vec3 deep = normalized(Vec3{back.x * 1.15, back.y * 1.7 + (y > 0 ? 0.25 : -0.25), back.z * 0.75}) *
+  const double corner_line =
+      lerp(kFissureY[0], kFissureY[8], clamp01((x - kFissureX[0]) / (kFissureX[8] - kFissureX[0])));
+  const double rise = back.y - corner_line;  // 0 at the corners
+  const Vec3 deep = normalized(Vec3{back.x * 1.12, back.y + 0.7 * rise + 0.25 * std::fmin(1, std::fmax(-1, rise / 0.2)),
+                                    back.z * 0.75}) *
                     (kEyeRadius + kLidGap + 0.03);
   Vec3 p = lerp(back, deep, clamp01(ring - kLidMarginBack));
   const double keep = kEyeRadius + kLidGap;
@@ -67,14 +71,14 @@ Vec3 eyePoint(double ring, double around) {
 // --- Mouth
 // -----------------------------------------------------------------------------------------------------------------------
 
-constexpr double kMouthGap = 0.006;  // half of the hair's gap between the closed lips
+constexpr double kMouthGap = 0.005;  // half of the hair's gap between the closed lips
 // 11 knots from the middle of the upper lip over the corner to the middle of the lower lip.
-constexpr double kBorderX[11] = {0.0, 0.52, 1.13, 1.75, 2.28, 2.62, 2.25, 1.72, 1.14, 0.57, 0.0};
-constexpr double kBorderY[11] = {-5.88, -5.74, -5.93, -6.20, -6.46, -6.68, -6.98, -7.28, -7.47, -7.56, -7.58};
-constexpr double kRimX[11] = {0.0, 0.50, 1.06, 1.62, 2.12, 2.50, 2.12, 1.62, 1.06, 0.50, 0.0};
-constexpr double kRimY[11] = {-6.66, -6.62, -6.60, -6.62, -6.66, -6.69, -6.66, -6.62, -6.60, -6.62, -6.66};
-constexpr double kRimBack[11] = {0.12, 0.13, 0.15, 0.16, 0.14, 0.10, 0.14, 0.16, 0.14, 0.12, 0.12};
-constexpr double kFullness[11] = {0.42, 0.40, 0.36, 0.28, 0.16, 0.03, 0.16, 0.32, 0.44, 0.48, 0.50};
+constexpr double kBorderX[11] = {0.0, 0.50, 1.08, 1.66, 2.16, 2.50, 2.13, 1.62, 1.07, 0.53, 0.0};
+constexpr double kBorderY[11] = {-5.90, -5.76, -5.93, -6.18, -6.42, -6.61, -6.93, -7.25, -7.46, -7.56, -7.58};
+constexpr double kRimX[11] = {0.0, 0.48, 1.0, 1.52, 1.98, 2.32, 1.98, 1.52, 1.0, 0.48, 0.0};
+constexpr double kRimY[11] = {-6.67, -6.63, -6.60, -6.61, -6.63, -6.62, -6.63, -6.61, -6.60, -6.63, -6.67};
+constexpr double kRimBack[11] = {0.20, 0.21, 0.22, 0.22, 0.18, 0.12, 0.18, 0.22, 0.22, 0.20, 0.20};
+constexpr double kFullness[11] = {0.42, 0.4, 0.35, 0.25, 0.12, 0.0, 0.13, 0.29, 0.42, 0.47, 0.49};
 
 Vec3 lipBorder(double around) {
   const Vec3 p{spline(kBorderX, around), spline(kBorderY, around), 0};
@@ -129,11 +133,11 @@ Vec3 nostrilPoint(double ring, double around) {
 
 // The ear's outline in its own plane: back (a) and up (b) from the middle of the root; 12 knots from the front over the
 // top.
-constexpr double kOutlineA[12] = {-0.80, -0.72, -0.42, 0.45, 1.55, 2.12, 2.10, 1.75, 1.20, 0.45, -0.25, -0.66};
-constexpr double kOutlineB[12] = {-0.25, 1.05, 2.30, 3.00, 2.65, 1.60, 0.20, -1.15, -2.25, -2.95, -2.60, -1.55};
+constexpr double kOutlineA[12] = {-0.80, -0.72, -0.40, 0.50, 1.55, 2.10, 2.06, 1.75, 1.30, 0.62, -0.10, -0.62};
+constexpr double kOutlineB[12] = {-0.25, 1.05, 2.25, 2.95, 2.62, 1.60, 0.20, -1.10, -2.15, -2.85, -2.62, -1.55};
 
 Vec3 earPoint(double ring, double around) {
-  const double flare = 0.36, tilt = 0.16;  // radians: out from the skull, and backward
+  const double flare = 0.33, tilt = 0.16;  // radians: out from the skull, and backward
   const double cf = std::cos(flare), sf = std::sin(flare), ct = std::cos(tilt), st = std::sin(tilt);
   const Vec3 back0{sf, 0, -cf}, out{cf, 0, sf}, up0{0, 1, 0};
   const Vec3 back = back0 * ct - up0 * st, up = up0 * ct + back0 * st;
@@ -153,15 +157,16 @@ Vec3 earPoint(double ring, double around) {
   const double lobe = smoothstep(-1.3, -2.2, ob);  // 1 in the lobe: no folds there
   // In front of the ear hole stands the tragus.
   const double tragus = std::exp(-4.0 * (ob + 0.45) * (ob + 0.45)) * (1 - free_edge);
+  const double edge = lerp(0.60, 0.22, lobe);  // how far the free edge stands out from the root
   const Vec3 rings[8] = {
-      root,                                                                                       // 1 on the head
-      lerp(lerp(root, shrunk(0.95, 0.2), 0.3), lerp(root, shrunk(0.93, 0.46), 0.72), free_edge),  // 2 back of the ear
-      lerp(shrunk(0.90, 0.22 + 0.25 * tragus), shrunk(1.0, 0.60), free_edge),                     // 3 edge
-      lerp(shrunk(0.82, 0.30 + 0.42 * tragus), shrunk(0.93, lerp(0.78, 0.70, lobe)), free_edge),  // 4 helix
-      lerp(shrunk(0.68, 0.30 + 0.45 * tragus), shrunk(0.80, lerp(0.46, 0.70, lobe)), free_edge),  // 5 groove
-      lerp(shrunk(0.58, 0.18 + 0.25 * tragus), shrunk(0.63, lerp(0.66, 0.66, lobe)), free_edge),  // 6 antihelix
-      lerp(shrunk(0.46, -0.10), shrunk(0.44, lerp(0.15, 0.25, lobe)), free_edge),  // 7 wall of the concha
-      shrunk(0.24, -0.18),                                                         // 8 floor
+      root,  // 1 on the head
+      lerp(lerp(root, shrunk(0.95, 0.2), 0.3), lerp(root, shrunk(0.93, edge - 0.14), 0.72), free_edge),   // 2 back
+      lerp(shrunk(0.90, 0.22 + 0.25 * tragus), shrunk(1.0, edge), free_edge),                             // 3 edge
+      lerp(shrunk(0.82, 0.30 + 0.42 * tragus), shrunk(0.93, edge + lerp(0.18, 0.10, lobe)), free_edge),   // 4 helix
+      lerp(shrunk(0.68, 0.30 + 0.45 * tragus), shrunk(0.80, edge + lerp(-0.14, 0.12, lobe)), free_edge),  // 5 groove
+      lerp(shrunk(0.58, 0.18 + 0.25 * tragus), shrunk(0.63, edge + lerp(0.06, 0.06, lobe)), free_edge),   // 6 antihelix
+      lerp(shrunk(0.46, -0.10), shrunk(0.44, edge + lerp(-0.45, -0.10, lobe)), free_edge),  // 7 wall of the concha
+      shrunk(0.24, -0.18),                                                                  // 8 floor
   };
   const double r = ring - kEarRoot;
   int i = static_cast<int>(r);
