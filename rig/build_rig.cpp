@@ -41,7 +41,8 @@ void placePoints(const Mesh& mesh, const FeaturePointChoices& choices, Rig& rig)
   std::size_t missing_count = 0;
   for (std::size_t p = 0; p < kFeaturePointCount; ++p)
     if (!choices.contains(p)) {
-      missing += (missing.empty() ? "" : " ") + idOf(p);
+      if (!missing.empty()) missing += ' ';
+      missing += idOf(p);
       ++missing_count;
     }
   if (missing_count > 0)
@@ -223,8 +224,12 @@ Rig buildRig(const Mesh& neutral, const FeaturePointChoices& points, const RigOp
         "the corners of both eyes (3.7 3.11, 3.8 3.12) are in one place; the eye separation is what a face is measured "
         "by");
 
-  rig.mesh_from_head = meshFromHead(rig.feature_positions);
-  rig.fapu = measureFapu(rig.feature_positions * rig.mesh_from_head);  // each row is turned by the inverse
+  try {
+    rig.mesh_from_head = meshFromHead(rig.feature_positions);
+    rig.fapu = measureFapu(rig.feature_positions * rig.mesh_from_head);  // each row is turned by the inverse
+  } catch (const std::invalid_argument& e) {
+    throw InputError(std::string("the feature points are not those of a face: ") + e.what());
+  }
 
   Skin skin = prepareSkin(neutral, weldSeams(neutral, slits(rig.feature_positions)));
   const std::vector<bool> is_skin = skinComponents(neutral, skin, rig);

@@ -275,9 +275,10 @@ class PartPlacer {
       }
       const Eigen::Vector3d size = part.high - part.low;
       // A tongue lies along the middle, deeper than wide; it can reach above the lower teeth.
-      const bool tongue = part.named({"tongue"}) ||
-                          (std::abs(part.centre[0] - mouth_[0]) < 0.1 * mouth_width_ && size[2] > 1.2 * size[0] &&
-                           part.vertices.size() > 30 && part.centre[1] < split + 0.1 * mouth_width_);
+      const bool tongue =
+          part.named({"tongue"}) || (std::abs(part.centre[0] - mouth_[0]) < 0.1 * mouth_width_ &&
+                                     size[2] > std::max(1.2 * size[0], 0.5 * mouth_width_) &&
+                                     part.vertices.size() > 30 && part.centre[1] < split + 0.1 * mouth_width_);
       const bool lower = tongue || part.named({"lower"}) || (!part.named({"upper"}) && part.centre[1] < split);
       auto& teeth = lower ? lower_teeth : upper_teeth;
       teeth.insert(teeth.end(), part.vertices.begin(), part.vertices.end());
