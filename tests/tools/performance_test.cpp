@@ -59,7 +59,7 @@ TEST(Performance, TakeWithoutLandmarksIsPlayedFromItsMasks) {
     protocol::TakeWriter writer((folder / "t.take").string(), {});
     MaskFrame mask;
     for (int i = 0; i < 5; ++i) {
-      mask.t_capture_ns = 1000 + i * 10'000'000;
+      mask.t_capture_ns = 9'000'000'000'123 + i * 10'000'000;
       mask.capture_seq = static_cast<std::uint64_t>(i);
       mask.state = TrackingState::tracking;
       mask.displacement_fapu[7] = {0.0F, 0.01F * static_cast<float>(i), 0.0F};
@@ -71,6 +71,8 @@ TEST(Performance, TakeWithoutLandmarksIsPlayedFromItsMasks) {
   EXPECT_TRUE(performance.landmarks.empty());
   ASSERT_EQ(performance.masks.size(), 5U);
   EXPECT_FLOAT_EQ(performance.masks[3].displacement_fapu[7][1], 0.03F);
+  EXPECT_EQ(performance.time(0), 0);  // whenever it was recorded, it begins at zero
+  EXPECT_EQ(performance.time(3), 30'000'000);
 }
 
 TEST(Performance, LiveLinkWeightsGoStraightThroughTheTable) {
@@ -88,6 +90,17 @@ TEST(Performance, LiveLinkWeightsGoStraightThroughTheTable) {
   EXPECT_LT(column(static_cast<Eigen::Index>(3 * chin + 1)), -0.1);  // an opening jaw takes the chin down
   EXPECT_NEAR(static_cast<double>(mask.displacement_fapu[chin][1]),
               0.5 * column(static_cast<Eigen::Index>(3 * chin + 1)), 1e-5);
+}
+
+TEST(Performance, AFileCutInTheMiddleOfARowIsNotPassedOffAsWhole) {
+  test::TemporaryDir folder;
+  const std::string text = test::openFaceCsv(test::syntheticPerformance({.frames = 5}));
+  try {
+    readPerformance(write(folder, "cut.csv", text.substr(0, text.size() - 300)));
+    FAIL() << "was read";
+  } catch (const rig::InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("cut.csv:6: "), std::string::npos) << error.what();
+  }
 }
 
 TEST(Performance, BadFilesAreRefusedWithOneLineThatNamesThem) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -22,13 +23,13 @@ struct PictureOptions {
 
 class PictureBaker {
  public:
-  // `frames`: how many will come, so that the moments of a sheet are spread over them. Borrows `rig`. Throws
-  // CommandError.
+  // `frames`: how many will come, so that the moments of a sheet are spread over them: the liveliest of each twelfth.
+  // Borrows `rig`. Throws CommandError.
   PictureBaker(const PictureOptions& options, const rig::Rig& rig, std::size_t frames);
   ~PictureBaker();
 
   // `number` names the file; frames come in order.
-  void frame(std::size_t number, const AvatarFrame& avatar);
+  void frame(std::size_t number, std::int64_t t_ns, const AvatarFrame& avatar);
   // Writes the sheet.
   void finish();
 

@@ -92,7 +92,9 @@ class PngSink : public Sink {
  public:
   PngSink(const Options& options, const rig::Rig& rig, std::size_t frames)
       : baker_({options.png, options.view, options.sheet}, rig, frames) {}
-  void frame(std::size_t number, const AvatarFrame& avatar, std::int64_t) override { baker_.frame(number, avatar); }
+  void frame(std::size_t number, const AvatarFrame& avatar, std::int64_t t_ns) override {
+    baker_.frame(number, t_ns, avatar);
+  }
   void finish() override { baker_.finish(); }
 
  private:

@@ -1,10 +1,10 @@
 // volto inspect: what a file is and how healthy it is, for people or as JSON.
 #include <cstdio>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
 #include "tools/cli/file_description.h"
 #include "tools/cli/read_input.h"

@@ -134,14 +134,24 @@ int run(const Options& options) {
     recorder.push(message);
     progress.show(++received);
   }
+  const protocol::SubscriberCounters& counters = subscriber.counters();
+  if (!recorder.anything() && counters.invalid > 0) {
+    throw CommandError(kUnavailable, options.endpoint + ": all of its " + std::to_string(counters.invalid) +
+                                         " messages were refused and no take written: " + subscriber.lastProblem() +
+                                         "; is it a Volto publisher of this version?");
+  }
   if (!recorder.anything()) {
     throw CommandError(kUnavailable,
                        options.endpoint + ": nothing was received and no take written; is a publisher running there?");
   }
   const protocol::TakeWriterCounters written = recorder.finish();
+  if (counters.invalid > 0) {
+    std::fprintf(stderr, "volto record: warning: %llu messages refused, the last because: %s\n",
+                 static_cast<unsigned long long>(counters.invalid), subscriber.lastProblem().c_str());
+  }
   std::printf("%llu messages recorded to %s; %llu lost on the way, %llu dropped while writing\n",
               static_cast<unsigned long long>(written.committed), options.output.c_str(),
-              static_cast<unsigned long long>(subscriber.counters().lost),
+              static_cast<unsigned long long>(counters.lost),
               static_cast<unsigned long long>(written.dropped));
   return kDone;
 }

@@ -36,7 +36,12 @@ std::string readUpTo(const capture::ByteSource& source, std::size_t limit) {
 }
 
 void takeReport(capture::ReadReport report, Performance& out) {
-  out.lost = report.rows_equal_time + (report.last_row_cut ? 1 : 0);
+  if (report.last_row_cut) {
+    // A whole performance was asked for: half of one is not quietly passed off as it.
+    const std::string where = report.warnings.empty() ? std::string("the file ends in the middle of its last row") : report.warnings.back();
+    throw rig::InputError(where.substr(0, where.find(';')) + "; copy it again, or delete that row to use the rest");
+  }
+  out.lost = report.rows_equal_time;
   out.warnings = std::move(report.warnings);
 }
 
@@ -81,6 +86,9 @@ void readStream(protocol::TakeReader& reader, protocol::MessageKind kind, std::v
       frames.push_back(message.frame);
     }
   }
+  // A take keeps the monotonic clock of the machine it was made on; a performance begins at zero.
+  const std::int64_t start_ns = frames.empty() ? 0 : frames.front().t_capture_ns;
+  for (Frame& frame : frames) frame.t_capture_ns -= start_ns;
   out.lost += not_later;
   if (other_sources > 0) {
     out.warnings.push_back(std::to_string(other_sources) + " frames of other sources than " + out.source + " left out");

@@ -1,0 +1,84 @@
+// volto rig and volto bake: files that are the same, byte for byte, run after run.
+#include <set>
+#include <sstream>
+
+#include <gtest/gtest.h>
+
+#include "tests/end_to_end/world.h"
+
+namespace volto::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Bake : public World {
+ protected:
+  static void expectSameFolders(const fs::path& a, const fs::path& b, std::size_t count) {
+    std::set<std::string> names;
+    for (const auto& entry : fs::directory_iterator(a)) names.insert(entry.path().filename().string());
+    EXPECT_EQ(names.size(), count);
+    for (const std::string& name : names) EXPECT_EQ(readFile(a / name), readFile(b / name)) << name;
+    EXPECT_EQ(static_cast<std::size_t>(std::distance(fs::directory_iterator(b), fs::directory_iterator())), count);
+  }
+};
+
+TEST_F(Bake, RiggingTwiceGivesIdenticalBytes) {
+  const Finished run = volto({"rig", headMesh(), "--points", headPoints(), "-o", output("again.rig")});
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_EQ(readFile(output("again.rig")), readFile(rig()));
+}
+
+TEST_F(Bake, BakingTwiceGivesIdenticalBytes) {
+  const std::string input = performance(30);
+  for (const std::string round : {"a", "b"}) {
+    const Finished run = volto({"bake", input, "--rig", rig(), "--obj", path("obj_" + round), "--csv",
+                                path(round + ".csv"), "--png", path("png_" + round), "--every", "10"});
+    ASSERT_EQ(run.status, 0) << run.err;
+    EXPECT_EQ(run.out + run.err, "");
+  }
+  EXPECT_EQ(readFile(path("a.csv")), readFile(path("b.csv")));
+  expectSameFolders(path("obj_a"), path("obj_b"), 3);
+  expectSameFolders(path("png_a"), path("png_b"), 3);
+}
+
+TEST_F(Bake, MeshKeepsTheArtistsVerticesAndFaces) {
+  ASSERT_EQ(volto({"bake", performance(4), "--rig", rig(), "--obj", path("obj")}).status, 0);
+  const auto count = [](const std::string& text, const std::string& keyword) {
+    std::size_t found = text.rfind(keyword, 0) == 0 ? 1 : 0;
+    for (std::size_t at = text.find("\n" + keyword); at != std::string::npos; at = text.find("\n" + keyword, at + 1))
+      ++found;
+    return found;
+  };
+  const std::string artist = readFile(headMesh()), baked = readFile(path("obj/frame_000003.obj"));
+  EXPECT_GT(count(artist, "v "), 1000U);
+  EXPECT_EQ(count(baked, "v "), count(artist, "v "));
+  EXPECT_EQ(count(baked, "f "), count(artist, "f "));
+}
+
+TEST_F(Bake, ContactSheetIsOnePicture) {
+  const Finished run =
+      volto({"bake", performance(60), "--rig", rig(), "--png", path("sheet.png"), "--view", "three-quarter"});
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_EQ(readFile(path("sheet.png")).substr(1, 3), "PNG");
+}
+
+TEST_F(Bake, EveryNthRowIsTheRowOfTheWholeBake) {
+  const std::string input = performance(21);
+  ASSERT_EQ(volto({"bake", input, "--rig", rig(), "--csv", path("all.csv")}).status, 0);
+  const Finished some = volto({"bake", input, "--rig", rig(), "--csv", "-", "--every", "10"});
+  ASSERT_EQ(some.status, 0);
+  const std::string all = readFile(path("all.csv"));
+  std::istringstream rows(some.out);
+  int count = 0;
+  for (std::string row; std::getline(rows, row); ++count) EXPECT_NE(all.find(row + "\n"), std::string::npos);
+  EXPECT_EQ(count, 4);  // header, frames 0, 10, 20
+}
+
+TEST_F(Bake, LiveLinkWeightsReachTheCharacterUnchanged) {
+  const Finished run = volto({"bake", write("l.csv", liveLinkCsv(10)), "--rig", rig(), "--csv", "-"});
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_NE(run.out.find(",0.500000"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace volto::test

@@ -1,0 +1,120 @@
+#include "tools/cli/bake_picture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+#include <vector>
+
+#include "tools/cli/output_file.h"
+#include "tools/picture/head_renderer.h"
+#include "tools/picture/png.h"
+#include "tools/picture/text.h"
+
+namespace volto::cli {
+
+namespace {
+
+constexpr std::size_t kSheetColumns = 4, kSheetRows = 3;
+constexpr int kTile_px = 320, kFrame_px = 512;
+
+picture::ViewOptions viewNamed(const std::string& name, int size_px, const rig::Rig& rig) {
+  picture::ViewOptions view = name == "side"            ? picture::sideView(size_px)
+                              : name == "three-quarter" ? picture::threeQuarterView(size_px)
+                                                        : picture::frontView(size_px);
+  const auto row = [&](Eigen::Index i) {
+    const Eigen::Vector3f r = rig.mesh_from_head.col(i).cast<float>();  // a row of the transpose
+    return picture::Vec3{r.x(), r.y(), r.z()};
+  };
+  view.head_from_mesh = {row(0), row(1), row(2)};
+  return view;
+}
+
+// How much is going on in a face: what makes one moment worth showing rather than another.
+float liveliness(const AvatarFrame& avatar) {
+  float sum = 0;
+  for (const float weight : avatar.weights) sum += weight * weight;
+  return sum;
+}
+
+}  // namespace
+
+std::string frameFileName(std::size_t number, const char* extension) {
+  char name[64];
+  std::snprintf(name, sizeof name, "frame_%06zu%s", number, extension);
+  return name;
+}
+
+struct PictureBaker::State {
+  struct Moment {
+    std::int64_t t_ns = 0;
+    float liveliness = -1;
+    HeadPose head;
+    std::vector<std::array<float, 3>> vertices;
+  };
+
+  State(PictureOptions o, const rig::Rig& rig, std::size_t frames)
+      : options(std::move(o)),
+        renderer(rig.neutral),
+        expected(std::max<std::size_t>(frames, 1)),
+        moments(std::min(expected, kSheetColumns * kSheetRows)) {
+    options.sheet = options.sheet || options.path.extension() == ".png";
+    view = viewNamed(options.view, options.sheet ? kTile_px : kFrame_px, rig);
+  }
+
+  picture::Picture render(const HeadPose& head, std::span<const std::array<float, 3>> vertices) {
+    view.head_rotation = head.observed ? head.rotation : HeadPose{}.rotation;
+    return renderer.render(vertices, view).picture;
+  }
+
+  PictureOptions options;
+  picture::HeadRenderer renderer;
+  picture::ViewOptions view;
+  std::size_t expected;
+  std::size_t seen = 0;
+  std::vector<Moment> moments;  // of a sheet: the liveliest frame of each stretch of the performance
+};
+
+PictureBaker::PictureBaker(const PictureOptions& options, const rig::Rig& rig, std::size_t frames)
+    : state_(std::make_unique<State>(options, rig, frames)) {
+  if (state_->options.sheet) {
+    requireReplaceable(options.path);
+  } else {
+    makeOutputFolder(options.path);
+  }
+}
+
+PictureBaker::~PictureBaker() = default;
+
+void PictureBaker::frame(std::size_t number, std::int64_t t_ns, const AvatarFrame& avatar) {
+  State& s = *state_;
+  if (!s.options.sheet) {
+    picture::writePng(s.options.path / frameFileName(number, ".png"), s.render(avatar.head, avatar.vertices));
+    return;
+  }
+  State::Moment& moment = s.moments[std::min(s.moments.size() - 1, s.seen * s.moments.size() / s.expected)];
+  ++s.seen;
+  const float lively = liveliness(avatar);
+  if (lively <= moment.liveliness) return;
+  moment = {t_ns, lively, avatar.head, avatar.vertices};
+}
+
+void PictureBaker::finish() {
+  State& s = *state_;
+  if (!s.options.sheet) return;
+  const std::size_t columns = std::min(kSheetColumns, s.moments.size());
+  const std::size_t rows = (s.moments.size() + columns - 1) / columns;
+  picture::Picture sheet(static_cast<int>(columns) * kTile_px, static_cast<int>(rows) * kTile_px);
+  for (std::size_t i = 0; i < s.moments.size(); ++i) {
+    const State::Moment& moment = s.moments[i];
+    if (moment.vertices.empty()) continue;
+    const int x = static_cast<int>(i % columns) * kTile_px, y = static_cast<int>(i / columns) * kTile_px;
+    picture::paste(sheet, s.render(moment.head, moment.vertices), x, y);
+    char label[32];
+    std::snprintf(label, sizeof label, "%.2f s", static_cast<double>(moment.t_ns) * 1e-9);
+    picture::drawText(sheet, static_cast<float>(x) + 10.0F, static_cast<float>(y + kTile_px) - 10.0F, label);
+  }
+  picture::writePng(s.options.path, sheet);
+}
+
+}  // namespace volto::cli
