@@ -238,7 +238,7 @@ HalfMesh makeBrow() {
     const double s = 1 - 2.0 * row / kAcross;  // 1 upper edge, -1 lower edge
     const Vec3 n = normalized(skinGradient(middle));
     Vec3 p = castToSkin({middle.x, middle.y + half * s, 16}, {0, 0, -1});
-    const double lift = 0.10 * (1 - s * s) * (0.4 + 0.6 * half / 0.27) - 0.02;
+    const double lift = 0.10 * (1 - s * s) * (0.4 + 0.6 * half / 0.27) + 0.015;
     return vertex(p + n * lift);
   };
   addSheet(mesh, kAcross, kSteps, false, false, at, [](int, int) { return Material::brows; });
