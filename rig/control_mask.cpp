@@ -149,17 +149,22 @@ constexpr std::array<HalfPoint, 48> kReferenceHalf = {{
     {"12.14", 0, -10, 25},
     {"12.15", 10, -77, 19},
     {"12.17", 31, -104, -4},
-    {"12.19", 64, -58, -42},
+    {"12.19", 63, -55, -33},
 }};
 // clang-format on
 
 FaceRegion mirrored(FaceRegion region) {
   switch (region) {
-    case FaceRegion::left_brow: return FaceRegion::right_brow;
-    case FaceRegion::left_upper_lid: return FaceRegion::right_upper_lid;
-    case FaceRegion::left_lower_lid: return FaceRegion::right_lower_lid;
-    case FaceRegion::left_cheek: return FaceRegion::right_cheek;
-    default: return region;
+    case FaceRegion::left_brow:
+      return FaceRegion::right_brow;
+    case FaceRegion::left_upper_lid:
+      return FaceRegion::right_upper_lid;
+    case FaceRegion::left_lower_lid:
+      return FaceRegion::right_lower_lid;
+    case FaceRegion::left_cheek:
+      return FaceRegion::right_cheek;
+    default:
+      return region;
   }
 }
 

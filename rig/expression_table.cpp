@@ -42,8 +42,11 @@ ExpressionTable ExpressionTable::parse(std::string_view text, const std::string&
     if (line.starts_with(kSourcePrefix)) {
       const std::string_view rest = line.substr(kSourcePrefix.size());
       const auto colon = rest.find(':');
-      const auto shape = colon == std::string_view::npos ? std::nullopt : arkitBlendshapeIndex(trimmed(rest.substr(0, colon)));
-      if (!shape) fail(name, line_number, "a source line reads \"# source SHAPE: where its numbers come from\", SHAPE an ARKit name");
+      const auto shape =
+          colon == std::string_view::npos ? std::nullopt : arkitBlendshapeIndex(trimmed(rest.substr(0, colon)));
+      if (!shape)
+        fail(name, line_number,
+             "a source line reads \"# source SHAPE: where its numbers come from\", SHAPE an ARKit name");
       table.source_[*shape] = std::string(trimmed(rest.substr(colon + 1)));
       continue;
     }
@@ -63,7 +66,8 @@ ExpressionTable ExpressionTable::parse(std::string_view text, const std::string&
       rest.remove_prefix(comma + 1);
     }
     if (++count != cells.size())
-      fail(name, line_number, "a row has 5 columns (" + std::string(kHeader) + "), this one has " + std::to_string(count));
+      fail(name, line_number,
+           "a row has 5 columns (" + std::string(kHeader) + "), this one has " + std::to_string(count));
     const auto shape = arkitBlendshapeIndex(cells[0]);
     if (!shape) fail(name, line_number, "\"" + std::string(cells[0]) + "\" is no ARKit blendshape");
     const auto point = featurePointIndex(cells[1]);
@@ -79,7 +83,8 @@ ExpressionTable ExpressionTable::parse(std::string_view text, const std::string&
       table.basis_(static_cast<Eigen::Index>(3 * *point + axis), static_cast<Eigen::Index>(*shape)) = value;
     }
   }
-  if (!header_seen || seen.empty()) fail(name, line_number, "no rows; an expression table has \"" + std::string(kHeader) + "\" and at least one row");
+  if (!header_seen || seen.empty())
+    fail(name, line_number, "no rows; an expression table has \"" + std::string(kHeader) + "\" and at least one row");
   for (std::size_t k = 0; k < kArkitBlendshapeCount; ++k)
     table.moves_mask_[k] = table.basis_.col(static_cast<Eigen::Index>(k)).cwiseAbs().maxCoeff() > 0;
   return table;
@@ -96,7 +101,8 @@ void ExpressionTable::apply(const ArkitWeights& weights, MaskDisplacements& out_
   for (std::size_t k = 0; k < kArkitBlendshapeCount; ++k)
     if (weights[k] != 0.0F) sum += static_cast<double>(weights[k]) * basis_.col(static_cast<Eigen::Index>(k));
   for (std::size_t i = 0; i < kFeaturePointCount; ++i)
-    for (std::size_t axis = 0; axis < 3; ++axis) out_fapu[i][axis] = static_cast<float>(sum(static_cast<Eigen::Index>(3 * i + axis)));
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      out_fapu[i][axis] = static_cast<float>(sum(static_cast<Eigen::Index>(3 * i + axis)));
 }
 
 }  // namespace volto::rig

@@ -26,11 +26,16 @@ constexpr double kNearZero = 0.02;  // of the human proportion: below it a unit 
 
 double& unitOf(Fapu& fapu, FapuUnit unit) {
   switch (unit) {
-    case FapuUnit::iris_diameter: return fapu.iris_diameter;
-    case FapuUnit::eye_separation: return fapu.eye_separation;
-    case FapuUnit::eye_nose: return fapu.eye_nose;
-    case FapuUnit::mouth_nose: return fapu.mouth_nose;
-    case FapuUnit::mouth_width: return fapu.mouth_width;
+    case FapuUnit::iris_diameter:
+      return fapu.iris_diameter;
+    case FapuUnit::eye_separation:
+      return fapu.eye_separation;
+    case FapuUnit::eye_nose:
+      return fapu.eye_nose;
+    case FapuUnit::mouth_nose:
+      return fapu.mouth_nose;
+    case FapuUnit::mouth_width:
+      return fapu.mouth_width;
   }
   throw std::logic_error("unknown FAPU");
 }
@@ -54,7 +59,8 @@ FapuMeasurement measureFapu(const FeaturePointPositions& neutral) {
   FapuMeasurement measured;
   Fapu& fapu = measured.fapu;
   fapu.eye_separation = (left_eye - right_eye).norm();
-  fapu.iris_diameter = 0.5 * ((neutral(row("3.1"), 1) - neutral(row("3.3"), 1)) + (neutral(row("3.2"), 1) - neutral(row("3.4"), 1)));
+  fapu.iris_diameter =
+      0.5 * ((neutral(row("3.1"), 1) - neutral(row("3.3"), 1)) + (neutral(row("3.2"), 1) - neutral(row("3.4"), 1)));
   fapu.eye_nose = eyes_y - neutral(row("9.15"), 1);
   fapu.mouth_nose = neutral(row("9.15"), 1) - neutral(row("2.2"), 1);
   fapu.mouth_width = (neutral.row(row("8.3")) - neutral.row(row("8.4"))).norm();
@@ -67,8 +73,8 @@ FapuMeasurement measureFapu(const FeaturePointPositions& neutral) {
     const double usual = human.of_eye_separation * fapu.eye_separation;
     double& unit = unitOf(fapu, human.unit);
     if (unit >= kNearZero * usual) continue;
-    measured.substitutions.push_back(std::string(human.name) + " is " + number(unit) + ", too small to measure by; " + number(usual) +
-                                     " is used, the human proportion");
+    measured.substitutions.push_back(std::string(human.name) + " is " + number(unit) + ", too small to measure by; " +
+                                     number(usual) + " is used, the human proportion");
     unit = usual;
   }
   return measured;

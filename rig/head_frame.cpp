@@ -1,10 +1,11 @@
 #include "rig/head_frame.h"
 
-#include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
+
+#include <Eigen/Geometry>
+#include <Eigen/SVD>
 
 #include "rig/control_mask.h"
 

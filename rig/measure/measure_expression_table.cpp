@@ -1,13 +1,10 @@
-// Measures the expression table on ICT-FaceKit's artist-made expressions and prints it: the file rig/assets/expression_table.csv.
-//
-//   volto-measure-expression-table ICT_FOLDER FEATURE_POINTS.json > rig/assets/expression_table.csv
-//
-// ICT_FOLDER holds neutral.obj and expressions/*.obj; FEATURE_POINTS.json the 84 vertex indices on it.
+#include "rig/measure/measure_expression_table.h"
+
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <iostream>
 #include <iterator>
 #include <string>
 #include <vector>
@@ -18,11 +15,10 @@
 #include "rig/head_frame.h"
 #include "rig/mesh_io.h"
 
+namespace volto::rig {
 namespace {
 
 namespace fs = std::filesystem;
-using namespace volto;
-using namespace volto::rig;
 
 constexpr double kNoiseFloor_fapu = 5e-4;  // smaller displacements are the sculptor's brush, not the expression
 
@@ -36,7 +32,9 @@ std::vector<std::string> ictNames(const std::string& arkit) {
   return {arkit};
 }
 
-int run(const fs::path& ict, const fs::path& points_file) {
+}  // namespace
+
+std::string measureExpressionTable(const fs::path& ict, const fs::path& points_file) {
   std::ifstream file(points_file);
   if (!file) throw InputError(points_file.string() + ": cannot be opened");
   const std::string json{std::istreambuf_iterator<char>(file), {}};
@@ -63,46 +61,42 @@ int run(const fs::path& ict, const fs::path& points_file) {
       sources[k] += (sources[k].empty() ? "" : " + ") + name;
     }
 
-  std::printf(
-      "# Volto's expression table: how each of the 52 ARKit blendshapes at weight 1 moves the 84 feature points of the control mask.\n"
-      "# x (to the subject's left), y (up), z (out of the face): displacement from neutral divided by the FAPU of that point's axis\n"
-      "# (rig/feature_points.cpp). A point without a row does not move. Left and right are mirror images of each other by construction.\n"
-      "# Measured by rig/measure/measure_expression_table.cpp on the artist-made expressions of ICT-FaceKit (USC ICT Vision and Graphics\n"
-      "# Lab, MIT licence) at 84 annotated vertices; numbers only, no mesh data. Displacements under %g FAPU are left out.\n#\n",
-      kNoiseFloor_fapu);
+  char line[160];
+  std::string text =
+      "# Volto's expression table: how each of the 52 ARKit blendshapes at weight 1 moves the 84 feature points of the "
+      "control mask.\n"
+      "# x (to the subject's left), y (up), z (out of the face): displacement from neutral divided by the FAPU of that "
+      "point's axis\n"
+      "# (rig/feature_points.cpp). A point without a row does not move. Left and right are mirror images of each other "
+      "by construction.\n"
+      "# Measured by rig/measure/measure_expression_table.cpp on the artist-made expressions of ICT-FaceKit (USC ICT "
+      "Vision and Graphics\n"
+      "# Lab, MIT licence) at 84 annotated vertices; numbers only, no mesh data. Displacements under 0.0005 FAPU are "
+      "left "
+      "out.\n#\n";
   for (std::size_t k = 0; k < kArkitBlendshapeCount; ++k) {
     const std::string& mirror = sources[arkitMirrorIndex(k)];
-    const std::string text = sources[k].empty() ? "not observed: moves no skin that the mask could show"
-                             : mirror == sources[k] ? "measured: ICT-FaceKit " + sources[k] + ", symmetrised"
-                                                    : "measured: ICT-FaceKit " + sources[k] + " averaged with " + mirror + " mirrored";
-    std::printf("# source %s: %s\n", std::string(kArkitBlendshapeNames[k]).c_str(), text.c_str());
+    const std::string source = sources[k].empty() ? "not observed: moves no skin that the mask could show"
+                               : mirror == sources[k]
+                                   ? "measured: ICT-FaceKit " + sources[k] + ", symmetrised"
+                                   : "measured: ICT-FaceKit " + sources[k] + " averaged with " + mirror + " mirrored";
+    text += "# source " + std::string(kArkitBlendshapeNames[k]) + ": " + source + "\n";
   }
-  std::printf("shape,feature_point,x,y,z\n");
+  text += "shape,feature_point,x,y,z\n";
   for (std::size_t k = 0; k < kArkitBlendshapeCount; ++k) {
     const FeaturePointPositions& other = measured[arkitMirrorIndex(k)];
     for (std::size_t i = 0; i < kFeaturePointCount; ++i) {
-      const Eigen::RowVector3d mirrored = other.row(featurePoints()[i].mirror).cwiseProduct(Eigen::RowVector3d(-1, 1, 1));
+      const Eigen::RowVector3d mirrored =
+          other.row(featurePoints()[i].mirror).cwiseProduct(Eigen::RowVector3d(-1, 1, 1));
       const Eigen::RowVector3d d = 0.5 * (measured[k].row(static_cast<Eigen::Index>(i)) + mirrored);
       if (d.cwiseAbs().maxCoeff() < kNoiseFloor_fapu) continue;
-      const auto rounded = [](double value) { return std::round(value * 1e4) / 1e4 + 0.0; };  // + 0.0: no negative zero
-      std::printf("%s,%s,%.4f,%.4f,%.4f\n", std::string(kArkitBlendshapeNames[k]).c_str(), std::string(featurePoints()[i].id).c_str(),
-                  rounded(d.x()), rounded(d.y()), rounded(d.z()));
+      const auto rounded = [](double value) { return std::round(value * 1e4) / 1e4 + 0.0; };  // + 0.0: no -0
+      std::snprintf(line, sizeof line, "%s,%s,%.4f,%.4f,%.4f\n", std::string(kArkitBlendshapeNames[k]).c_str(),
+                    std::string(featurePoints()[i].id).c_str(), rounded(d.x()), rounded(d.y()), rounded(d.z()));
+      text += line;
     }
   }
-  return 0;
+  return text;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  if (argc != 3) {
-    std::cerr << "usage: volto-measure-expression-table ICT_FOLDER FEATURE_POINTS.json\n";
-    return 2;
-  }
-  try {
-    return run(argv[1], argv[2]);
-  } catch (const std::exception& error) {
-    std::cerr << "volto-measure-expression-table: " << error.what() << '\n';
-    return 65;
-  }
-}
+}  // namespace volto::rig
