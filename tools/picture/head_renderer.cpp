@@ -36,7 +36,7 @@ struct HeadRenderer::State {
   std::vector<Camera::Point> screen, light_screen;
   VisibilityBuffer visible, shadow;
   OcclusionInput surfaces_seen;
-  std::vector<float> open;
+  std::vector<float> open, light_depth;
 
   State(const rig::Mesh& mesh, const Look& given);
   void project(const Camera& camera, std::span<const Vec3> points);
@@ -109,7 +109,7 @@ void HeadRenderer::State::computeNormals() {
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     const auto& [a, b, c] = triangles[t];
     const Vec3 normal = cross(view_points[b] - view_points[a], view_points[c] - view_points[a]);
-    face_normals[t] = normal;
+    face_normals[t] = normalised(normal);
     if (!finite(normal)) continue;
     normals[a] = normals[a] + normal;
     normals[b] = normals[b] + normal;
@@ -139,6 +139,11 @@ void HeadRenderer::State::castShadow(Vec3 towards) {
                        finite(view_points[v]) ? light_far - p.z : -1.0F};
   }
   rasterise(light_screen, triangles, kShadowSize, kShadowSize, 1, 0.0F, shadow);
+  light_depth.resize(shadow.inverse_depth.size());
+  for (std::size_t i = 0; i < light_depth.size(); ++i) {
+    light_depth[i] =
+        shadow.inverse_depth[i] > 0.0F ? 1.0F / shadow.inverse_depth[i] : std::numeric_limits<float>::max();
+  }
 }
 
 // How much of the key light reaches a point, by comparing with the light's z-buffer around it; softer the wider it
@@ -154,9 +159,7 @@ float HeadRenderer::State::keyLight(Vec3 view_point, Vec3 normal) const {
   for (const auto& tap : kTaps) {
     const int column = std::clamp(static_cast<int>(x + kReach * tap[0]), 0, kShadowSize - 1);
     const int row = std::clamp(static_cast<int>(y + kReach * tap[1]), 0, kShadowSize - 1);
-    const float inverse =
-        shadow.inverse_depth[static_cast<std::size_t>(row) * kShadowSize + static_cast<std::size_t>(column)];
-    const float nearest = inverse > 0.0F ? 1.0F / inverse : std::numeric_limits<float>::max();
+    const float nearest = light_depth[static_cast<std::size_t>(row) * kShadowSize + static_cast<std::size_t>(column)];
     lit += 1.0F - std::clamp((depth - nearest) / soft, 0.0F, 1.0F);
   }
   return lit / static_cast<float>(kTaps.size());
@@ -233,48 +236,62 @@ Rendered HeadRenderer::State::render(std::span<const Vec3> points, const ViewOpt
   surfaces_seen.radius = 0.075F * head_size;
   ambientOcclusion(surfaces_seen, open);
 
+  const auto colourAt = [&](std::uint32_t triangle, float x, float y, std::size_t pixel) {
+    const Vec3 w = cornersAt(triangle, x, y);
+    const Vec3 position = blended(view_points, triangle, w), to_viewer = normalised(eye - position);
+    const Vec3 normal = normalAt(triangle, w, to_viewer);
+    const Surface& material = look.surfaces[surface[triangle]];
+    Vec3 albedo = material.albedo;
+    if (material.eyeball >= 0) {
+      const Eyeball& ball = look.eyeballs[static_cast<std::size_t>(material.eyeball)];
+      albedo = eyeballAlbedo(ball, albedo, blended(neutral, triangle, w) - ball.centre);
+    }
+    if (!look.vertex_tint.empty()) albedo = albedo * blended(look.vertex_tint, triangle, w);
+    return toneMapped(shade(material, albedo, normal, to_viewer, lights, open[pixel], keyLight(position, normal)));
+  };
+  // Neighbours on the same smooth surface.
+  const auto goesOn = [&](std::uint32_t a, std::uint32_t b) {
+    if (surface[a] != surface[b] || look.surfaces[surface[a]].eyeball >= 0 ||
+        dot(face_normals[a], face_normals[b]) < 0.94F) {
+      return false;
+    }
+    for (const std::uint32_t p : triangles[a]) {
+      if (p == triangles[b][0] || p == triangles[b][1] || p == triangles[b][2]) return true;
+    }
+    return false;
+  };
+
   const Vec3 top{view.background_top[0], view.background_top[1], view.background_top[2]};
   const Vec3 bottom{view.background_bottom[0], view.background_bottom[1], view.background_bottom[2]};
+  const auto backgroundAt = [&](int x, int y) {
+    const float dx = (static_cast<float>(x) + 0.5F) / static_cast<float>(view.width_px) - 0.5F;
+    const float dy = (static_cast<float>(y) + 0.5F) / static_cast<float>(view.height_px) - 0.42F;
+    return mix(top, bottom, std::clamp(1.55F * std::sqrt(dx * dx + dy * dy), 0.0F, 1.0F));
+  };
   for (int y = 0; y < view.height_px; ++y) {
     for (int x = 0; x < view.width_px; ++x) {
       const std::size_t pixel =
           static_cast<std::size_t>(y) * static_cast<std::size_t>(view.width_px) + static_cast<std::size_t>(x);
-      const float from_middle = std::hypot((static_cast<float>(x) + 0.5F) / static_cast<float>(view.width_px) - 0.5F,
-                                           (static_cast<float>(y) + 0.5F) / static_cast<float>(view.height_px) - 0.42F);
-      const Vec3 background = mix(top, bottom, std::clamp(1.55F * from_middle, 0.0F, 1.0F));
+      const std::size_t first = static_cast<std::size_t>(y * samples) * stride + static_cast<std::size_t>(x * samples);
+      // A triangle is shaded once per pixel; one that goes on smoothly from the triangle before is not shaded at all.
       std::array<std::uint32_t, 16> seen;
       std::array<Vec3, 16> colour;
       std::size_t kinds = 0;
       Vec3 sum{};
       for (int j = 0; j < samples; ++j) {
         for (int i = 0; i < samples; ++i) {
-          const int sx = x * samples + i, sy = y * samples + j;
           const std::uint32_t triangle =
-              visible.triangle[static_cast<std::size_t>(sy) * stride + static_cast<std::size_t>(sx)];
+              visible.triangle[first + static_cast<std::size_t>(j) * stride + static_cast<std::size_t>(i)];
           if (triangle == kNoTriangle) {
-            sum = sum + background;
+            sum = sum + backgroundAt(x, y);
             continue;
           }
-          // A triangle is shaded once per pixel.
           std::size_t k = 0;
-          while (k < kinds && seen[k] != triangle) ++k;
+          while (k < kinds && seen[k] != triangle && !goesOn(seen[k], triangle)) ++k;
           if (k == kinds) {
-            const Vec3 w = cornersAt(triangle, (static_cast<float>(sx) + 0.5F) * per_sample,
-                                     (static_cast<float>(sy) + 0.5F) * per_sample);
-            const Vec3 position = blended(view_points, triangle, w);
-            const Vec3 to_viewer = normalised(eye - position);
-            const Vec3 normal = normalAt(triangle, w, to_viewer);
-            const Surface& material = look.surfaces[surface[triangle]];
-            Vec3 albedo = material.albedo;
-            if (material.eyeball >= 0) {
-              const Eyeball& ball = look.eyeballs[static_cast<std::size_t>(material.eyeball)];
-              albedo = eyeballAlbedo(ball, albedo, blended(neutral, triangle, w) - ball.centre);
-            }
-            if (!look.vertex_tint.empty()) albedo = albedo * blended(look.vertex_tint, triangle, w);
             seen[kinds] = triangle;
-            colour[kinds] =
-                toneMapped(shade(material, albedo, normal, to_viewer, lights, open[pixel], keyLight(position, normal)));
-            ++kinds;
+            colour[kinds++] = colourAt(triangle, static_cast<float>(x) + (static_cast<float>(i) + 0.5F) * per_sample,
+                                       static_cast<float>(y) + (static_cast<float>(j) + 0.5F) * per_sample, pixel);
           }
           sum = sum + colour[k];
         }

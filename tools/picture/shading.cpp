@@ -19,6 +19,20 @@ float power(float x, float n) {
   return result;
 }
 
+constexpr std::size_t kSrgbSteps = 4096;
+const std::array<std::uint8_t, kSrgbSteps + 1> kSrgb = [] {
+  std::array<std::uint8_t, kSrgbSteps + 1> out{};
+  for (std::size_t i = 0; i <= kSrgbSteps; ++i) {
+    const double x = static_cast<double>(i) / kSrgbSteps;
+    const double y = x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1.0 / 2.4) - 0.055;
+    out[i] = static_cast<std::uint8_t>(std::lround(255.0 * y));
+  }
+  return out;
+}();
+
+// 0 and 1 stay; what lies between is raised towards the root.
+float lifted(float x, float amount) { return x + (std::sqrt(x) - x) * amount; }
+
 float smooth(float from, float to, float x) {
   const float t = std::clamp((x - from) / (to - from), 0.0F, 1.0F);
   return t * t * (3.0F - 2.0F * t);
@@ -52,19 +66,16 @@ Vec3 shade(const Surface& surface, Vec3 albedo, Vec3 normal, Vec3 to_viewer, con
   const float fresnel = surface.specular + (1.0F - surface.specular) * 0.35F * power(away, 5.0F);
   Vec3 diffuse = mix(lights.ground, lights.sky, 0.5F + 0.5F * normal.y);
   // What is dark by occlusion in skin is lit by red light from within.
-  const Vec3 opened{std::pow(open, 1.0F - 0.35F * surface.softness), open, open};
+  const Vec3 opened{lifted(open, 0.6F * surface.softness), open, open};
   diffuse = diffuse * opened;
   Vec3 mirror{};
   bool key = true;
   for (const Light& light : lights.lights) {
     const float cosine = dot(normal, light.towards);
     const float reach = key ? lit : 0.35F + 0.65F * open;
-    const auto lambert = [&](float w) {
-      const float v = std::max(0.0F, cosine + w) / ((1.0F + w) * (1.0F + 0.5F * w));
-      return v;
-    };
+    const auto lambert = [&](float w) { return std::max(0.0F, cosine + w) / ((1.0F + w) * (1.0F + 0.5F * w)); };
     const Vec3 soft_reach =
-        key ? Vec3{std::pow(reach, 1.0F - 0.4F * surface.softness), reach, reach} : Vec3{reach, reach, reach};
+        key ? Vec3{lifted(reach, 0.7F * surface.softness), reach, reach} : Vec3{reach, reach, reach};
     diffuse = diffuse + light.colour * Vec3{lambert(wrap.x), lambert(wrap.y), lambert(wrap.z)} * soft_reach;
     if (cosine > 0.0F) {
       const Vec3 half = normalised(light.towards + to_viewer);
@@ -102,17 +113,7 @@ Vec3 toneMapped(Vec3 light) {
 }
 
 std::uint8_t srgb(float linear) {
-  constexpr std::size_t kSteps = 4096;
-  static const auto table = [] {
-    std::array<std::uint8_t, kSteps + 1> out{};
-    for (std::size_t i = 0; i <= kSteps; ++i) {
-      const double x = static_cast<double>(i) / kSteps;
-      const double y = x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1.0 / 2.4) - 0.055;
-      out[i] = static_cast<std::uint8_t>(std::lround(255.0 * y));
-    }
-    return out;
-  }();
-  return table[static_cast<std::size_t>(std::clamp(linear, 0.0F, 1.0F) * kSteps + 0.5F)];
+  return kSrgb[static_cast<std::size_t>(std::clamp(linear, 0.0F, 1.0F) * kSrgbSteps + 0.5F)];
 }
 
 float linearFromSrgb(std::uint8_t value) {

@@ -14,6 +14,12 @@ struct Grid {
   std::int64_t x, y;
 };
 
+// A vertex on the grid; inverse_depth 0: not drawable.
+struct Corner {
+  Grid at{0, 0};
+  float inverse_depth = 0.0F;
+};
+
 // Does an edge from a to b belong to the triangle on its left? (y down, counter-clockwise on screen as positive area
 // here.)
 bool ownsEdge(Grid a, Grid b) { return (b.y == a.y && b.x < a.x) || b.y > a.y; }
@@ -29,19 +35,22 @@ void rasterise(std::span<const Camera::Point> points, std::span<const std::array
   out.inverse_depth.assign(count, 0.0F);
   const auto scale = static_cast<float>(samples);
 
+  std::vector<Corner> corners(points.size());
+  for (std::size_t v = 0; v < points.size(); ++v) {
+    const Camera::Point& p = points[v];
+    const float x = p.x_px * scale, y = p.y_px * scale;
+    if (!(p.depth > near_depth && p.depth < 1e30F && std::abs(x) < kFarthest && std::abs(y) < kFarthest)) continue;
+    corners[v] = {{std::lrint(x * static_cast<float>(kSub)), std::lrint(y * static_cast<float>(kSub))}, 1.0F / p.depth};
+  }
+
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     Grid grid[3];
     float inverse[3];
-    bool drawable = true;
-    for (std::size_t k = 0; k < 3 && drawable; ++k) {
-      const Camera::Point& p = points[triangles[t][k]];
-      const float x = p.x_px * scale, y = p.y_px * scale;
-      drawable = p.depth > near_depth && p.depth < 1e30F && std::abs(x) < kFarthest && std::abs(y) < kFarthest;
-      if (!drawable) break;
-      grid[k] = {std::lrint(x * static_cast<float>(kSub)), std::lrint(y * static_cast<float>(kSub))};
-      inverse[k] = 1.0F / p.depth;
+    for (std::size_t k = 0; k < 3; ++k) {
+      grid[k] = corners[triangles[t][k]].at;
+      inverse[k] = corners[triangles[t][k]].inverse_depth;
     }
-    if (!drawable) continue;
+    if (inverse[0] == 0.0F || inverse[1] == 0.0F || inverse[2] == 0.0F) continue;
     std::int64_t area =
         (grid[1].x - grid[0].x) * (grid[2].y - grid[0].y) - (grid[1].y - grid[0].y) * (grid[2].x - grid[0].x);
     if (area == 0) continue;
