@@ -1,11 +1,13 @@
 #include "protocol/take_reader.h"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <charconv>
 #include <cstring>
 #include <fcntl.h>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -103,11 +105,13 @@ struct TakeReader::State {
   }
 
   void open() {
+    constexpr int kFlags = SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX;
     try {
-      openAs(path, SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX);
+      openAs(path, kFlags, Mode::strict);
       return;
     } catch (const DatabaseError& e) {
       database.reset();
+      if ((e.code & 0xFF) == SQLITE_CORRUPT) return openCut(kFlags);
       std::error_code ignored;
       const bool has_wal =
           std::filesystem::exists(path + "-wal", ignored) && std::filesystem::file_size(path + "-wal", ignored) > 0;
@@ -116,18 +120,32 @@ struct TakeReader::State {
     }
     // A medium where not even the index of an empty journal can be made.
     try {
-      openAs(uriOf(path), SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_URI);
+      openAs(uriOf(path), kFlags | SQLITE_OPEN_URI, Mode::strict);
     } catch (const DatabaseError& e) {
       throw notATake(path, e.what());
     }
   }
 
+  // A file that is shorter than its first page says is refused by SQLite, unless it is told that somebody is at work on
+  // its insides.
+  void openCut(int flags) {
+    file_damaged = true;
+    try {
+      openAs(path, flags, Mode::salvage);
+    } catch (const DatabaseError& e) {
+      throw notATake(path, e.what());
+    }
+  }
+
+  enum class Mode { strict, salvage };
+
   // With everything switched off that a hostile file could make SQLite do.
-  void openAs(const std::string& name, int flags) {
+  void openAs(const std::string& name, int flags, Mode mode) {
     database.emplace(name, flags);
     sqlite3* db = database->get();
     sqlite3_busy_timeout(db, 1000);
-    sqlite3_db_config(db, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+    sqlite3_db_config(db, SQLITE_DBCONFIG_DEFENSIVE, mode == Mode::strict ? 1 : 0, nullptr);
+    sqlite3_db_config(db, SQLITE_DBCONFIG_WRITABLE_SCHEMA, mode == Mode::salvage ? 1 : 0, nullptr);
     sqlite3_db_config(db, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
     sqlite3_db_config(db, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
     sqlite3_db_config(db, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
@@ -163,7 +181,7 @@ struct TakeReader::State {
   void quickCheck() {
     try {
       Statement statement(database->get(), "PRAGMA quick_check(1)");
-      file_damaged = statement.step() != SQLITE_ROW || statement.text(0) != "ok";
+      file_damaged = statement.step() != SQLITE_ROW || statement.text(0) != "ok" || file_damaged;
     } catch (const DatabaseError&) {
       file_damaged = true;
     }
@@ -196,7 +214,7 @@ struct TakeReader::State {
   void rewind() {
     scan->reset();
     probe->reset();
-    last_id = 0;
+    last_id = cursor = bad_since_good = 0;
     counters = {};
     counters.file_damaged = file_damaged;
     at_end = false;
@@ -205,7 +223,7 @@ struct TakeReader::State {
 
   void startScan() {
     scan->reset();
-    scan->bind(1, last_id);
+    scan->bind(1, cursor);
   }
 
   // A row that `statement` stands on: true when it may be handed out. Else it is counted.
@@ -224,8 +242,8 @@ struct TakeReader::State {
       countBad(id, "the checksum does not match");
       return false;
     }
-    counters.lost_rows += static_cast<std::uint64_t>(id - last_id - 1);
-    last_id = id;
+    countLost(id - last_id - 1);
+    last_id = cursor = id;
     const std::optional<Topic> parsed = parseTopic(row_topic);
     if (!parsed) {
       ++counters.unknown_topics;
@@ -239,6 +257,7 @@ struct TakeReader::State {
       verdict = Result::bad("the message is not of its topic's kind");
     if (!verdict.ok()) {
       countBad(id, verdict.problem);
+      bad_since_good = 0;  // its number is known to be right
       return false;
     }
     topic.assign(row_topic);
@@ -254,9 +273,16 @@ struct TakeReader::State {
 
   void countBad(std::int64_t id, const std::string& why) {
     ++counters.bad_rows;
-    // A row that is there is bad, not lost.
-    if (id == last_id + 1) last_id = id;
+    ++bad_since_good;
+    // Where to go on if the next page cannot be read; a number that was hit itself may be anything.
+    if (id > cursor && id - cursor <= 1000) cursor = id;
     if (counters.first_problem.empty()) counters.first_problem = path + ": row " + std::to_string(id) + ": " + why;
+  }
+
+  // Numbers missing since the last good row: some of them are the bad rows, which are there.
+  void countLost(std::int64_t missing) {
+    counters.lost_rows += static_cast<std::uint64_t>(std::max<std::int64_t>(missing - bad_since_good, 0));
+    bad_since_good = 0;
   }
 
   bool next(TakeRow& row) {
@@ -272,7 +298,7 @@ struct TakeReader::State {
       }
       file_damaged = counters.file_damaged = true;
       if (counters.first_problem.empty())
-        counters.first_problem = path + ": after row " + std::to_string(last_id) + ": " + database->message();
+        counters.first_problem = path + ": after row " + std::to_string(cursor) + ": " + database->message();
       switch (findNext(row)) {
         case Found::row:
           startScan();
@@ -293,28 +319,35 @@ struct TakeReader::State {
   // Beyond a page that cannot be read: asks for each number by itself.
   Found findNext(TakeRow& row) {
     const std::int64_t last =
-        expected_rows ? std::min(*expected_rows, last_id + kMaxConsecutiveMisses) : last_id + kMaxConsecutiveMisses;
-    for (std::int64_t id = last_id + 1; id <= last; ++id) {
+        std::min(expected_rows.value_or(std::numeric_limits<std::int64_t>::max()), cursor + possibleRows());
+    for (std::int64_t id = cursor + 1; id <= last; ++id) {
       probe->reset();
       probe->bind(1, id);
       if (probe->step() != SQLITE_ROW) continue;
       const bool good = accept(*probe, row);
       probe->reset();
-      if (good) return Found::row;
-      if (last_id < id) {  // bad, and not simply the next one: step over it
-        counters.lost_rows += static_cast<std::uint64_t>(id - last_id - 1);
-        last_id = id;
-      }
-      return Found::bad_row;
+      cursor = id;
+      return good ? Found::row : Found::bad_row;
     }
     return Found::nothing;
+  }
+
+  // No more than fit into a file of this size.
+  std::int64_t possibleRows() const {
+    constexpr std::int64_t kLeastRowBytes = 64;
+    std::int64_t bytes = 0;
+    for (const char* suffix : {"", "-wal"}) {
+      std::error_code error;
+      const auto size = std::filesystem::file_size(path + suffix, error);
+      if (!error) bytes += static_cast<std::int64_t>(size);
+    }
+    return std::min(bytes / kLeastRowBytes + 1, kMaxConsecutiveMisses);
   }
 
   void finishCounting() {
     at_end = true;
     scan->reset();
-    if (expected_rows && *expected_rows > last_id)
-      counters.lost_rows += static_cast<std::uint64_t>(*expected_rows - last_id);
+    if (expected_rows && *expected_rows > last_id) countLost(*expected_rows - last_id);
   }
 
   std::string path;
@@ -323,7 +356,9 @@ struct TakeReader::State {
   TakeHeader header;
   bool finished = false, file_damaged = false, at_end = false;
   std::optional<std::int64_t> expected_rows;
-  std::int64_t last_id = 0;
+  std::int64_t last_id = 0;         // of the last row that could be trusted
+  std::int64_t cursor = 0;          // where a new scan begins
+  std::int64_t bad_since_good = 0;  // rows
   TakeReaderCounters counters;
   Inspector inspector;
   std::vector<std::uint64_t> aligned;
