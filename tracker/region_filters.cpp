@@ -1,0 +1,63 @@
+#include "tracker/region_filters.h"
+
+#include <algorithm>
+#include <string_view>
+
+namespace volto::tracker {
+namespace {
+
+// Weights are 0..1, so a speed of 5 per second is a mouth that opens in 0.2 s: with beta 2 its cut-off is 10 Hz above the one at rest.
+constexpr OneEuroConstants kLids{5.0, 4.0};
+constexpr OneEuroConstants kBrows{2.0, 2.0};
+constexpr OneEuroConstants kMouth{4.0, 3.0};
+constexpr OneEuroConstants kElsewhere{2.5, 2.0};  // nose, cheeks
+
+// Residuals are millimetres; detector noise lives here, so they are held stiller than the weights.
+constexpr OneEuroConstants kLidPoints{3.0, 0.2};
+constexpr OneEuroConstants kMouthPoints{2.5, 0.15};
+constexpr OneEuroConstants kOtherPoints{1.0, 0.05};
+
+OneEuroConstants constantsOf(std::string_view shape) {
+  if (shape.starts_with("eye")) return kLids;
+  if (shape.starts_with("brow")) return kBrows;
+  if (shape.starts_with("mouth") || shape.starts_with("jaw") || shape.starts_with("tongue")) return kMouth;
+  return kElsewhere;
+}
+
+OneEuroConstants constantsOf(rig::FaceRegion region) {
+  switch (region) {
+    case rig::FaceRegion::left_upper_lid:
+    case rig::FaceRegion::left_lower_lid:
+    case rig::FaceRegion::right_upper_lid:
+    case rig::FaceRegion::right_lower_lid: return kLidPoints;
+    case rig::FaceRegion::upper_lip:
+    case rig::FaceRegion::lower_lip:
+    case rig::FaceRegion::chin: return kMouthPoints;
+    default: return kOtherPoints;
+  }
+}
+
+}  // namespace
+
+RegionFilters::RegionFilters() {
+  for (std::size_t k = 0; k < kArkitBlendshapeCount; ++k) shape_constants_[k] = constantsOf(kArkitBlendshapeNames[k]);
+  const auto points = rig::featurePoints();
+  for (std::size_t i = 0; i < kFeaturePointCount; ++i) point_constants_[i] = constantsOf(points[i].region);
+}
+
+void RegionFilters::reset() {
+  for (OneEuro& f : shapes_) f.reset();
+  for (OneEuro& f : points_) f.reset();
+}
+
+void RegionFilters::push(double dt_s, double smoothing, ArkitWeights& weights, rig::FeaturePointPositions& rest_mm) {
+  for (std::size_t k = 0; k < kArkitBlendshapeCount; ++k)
+    weights[k] = std::clamp(static_cast<float>(shapes_[k].push(weights[k], dt_s, shape_constants_[k], smoothing)), 0.0F, 1.0F);
+  for (std::size_t i = 0; i < kFeaturePointCount; ++i)
+    for (std::size_t c = 0; c < 3; ++c) {
+      double& value = rest_mm(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(c));
+      value = points_[3 * i + c].push(value, dt_s, point_constants_[i], smoothing);
+    }
+}
+
+}  // namespace volto::tracker

@@ -1,0 +1,29 @@
+// One-Euro filters for a MaskFrame: constants per region of the face, since a lid closes in 0.1 s and a brow takes its time.
+// Internal to the tracker.
+#pragma once
+
+#include <array>
+
+#include "frames/mask_frame.h"
+#include "rig/feature_points.h"
+#include "tracker/one_euro.h"
+
+namespace volto::tracker {
+
+// Filters weights, and what the measured points add to them, each with the constants of its region.
+class RegionFilters {
+ public:
+  RegionFilters();
+
+  void reset();
+  // In place. `rest_mm`: displacement of each point beyond what the weights explain, 84 by 3.
+  void push(double dt_s, double smoothing, ArkitWeights& weights, rig::FeaturePointPositions& rest_mm);
+
+ private:
+  std::array<OneEuroConstants, kArkitBlendshapeCount> shape_constants_;
+  std::array<OneEuroConstants, kFeaturePointCount> point_constants_;
+  std::array<OneEuro, kArkitBlendshapeCount> shapes_;
+  std::array<OneEuro, 3 * kFeaturePointCount> points_;
+};
+
+}  // namespace volto::tracker
