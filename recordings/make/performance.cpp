@@ -229,7 +229,7 @@ void Performance::addHead(double t_s, Moment& moment) const {
   moment.roll_rad = kDegree * (roll_.at(t_s) + 0.7 * wander_[2].at(t_s));
   // The head is carried by the neck: turning moves it sideways, nodding lowers it.
   moment.head_mm = {4.0 + 3.0 * wander_[3].at(t_s) + 55.0 * std::sin(moment.yaw_rad),
-                    2.0 + 2.0 * wander_[4].at(t_s) - 45.0 * std::sin(up_rad) + 3.0 * laughter(t_s),
+                    -38.0 + 2.0 * wander_[4].at(t_s) - 45.0 * std::sin(up_rad) + 3.0 * laughter(t_s),
                     560.0 + 4.0 * wander_[5].at(t_s) + lean_.at(t_s)};
 }
 

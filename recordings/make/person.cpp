@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "recordings/make/motion.h"
+#include "recordings/make/sha256.h"
 #include "rig/control_mask.h"
 #include "rig/expression_table.h"
 #include "rig/fapu.h"
@@ -130,6 +131,18 @@ Person::Landmarks Person::landmarks(const ArkitWeights& weights) const {
     if (point_of[i] < 0) out[i] = (9.0 * (out[i - 1] + out[i + 1]) - (out[i - 2] + out[i + 2])) / 16.0;
   }
   return out;
+}
+
+std::string Person::digest() const {
+  std::string text;
+  const auto add = [&text](const rig::FeaturePointPositions& points) {
+    for (Eigen::Index p = 0; p < kPoints; ++p) {
+      for (Eigen::Index axis = 0; axis < 3; ++axis) text += std::to_string(std::llround(1e6 * points(p, axis))) + ' ';
+    }
+  };
+  add(neutral_);
+  for (const rig::FeaturePointPositions& move : moves_) add(move);
+  return sha256Hex(text);
 }
 
 }  // namespace volto::recordings

@@ -177,7 +177,7 @@ std::string truthCsv(const ShippedTake& take) {
 void writeShippedTake(const ShippedTake& take, const std::filesystem::path& folder) {
   writeTake(take, folder / "volto_take.take");
   writeWhole(folder / "volto_take.truth.csv", truthCsv(take));
-  std::string manifest = "{\n  \"files\": [\n";
+  std::string manifest = "{\n  \"made_from\": \"" + Person().digest() + "\",\n  \"files\": [\n";
   manifest += manifestEntry(folder, "volto_take.take",
                             "36 s at 60 frames a second: a face speaks, blinks, smiles, frowns and turns its head; 68 "
                             "iBUG landmarks in pixels "
