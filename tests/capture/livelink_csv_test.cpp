@@ -30,18 +30,18 @@ struct LiveLinkText {
 
   std::string str() const {
     std::string text = "Timecode," + count_name;
-    for (const auto name : kArkitBlendshapeNames) text += "," + spell(std::string(name));
-    for (const char* name : kOthers) text += std::string(",") + name;
+    for (const auto name : kArkitBlendshapeNames) (text += ",") += spell(std::string(name));
+    for (const char* name : kOthers) (text += ",") += name;
     text += newline;
     for (std::size_t r = 0; r < timecodes.size(); ++r) {
       const auto cell = [&](const std::string& column, const std::string& value) {
         return edit ? edit(r, column, value) : value;
       };
-      text += timecodes[r] + "," + cell(count_name, "61");
+      (text += timecodes[r] + ",") += cell(count_name, "61");
       for (std::size_t k = 0; k < kArkitBlendshapeCount; ++k) {
-        text += "," + cell(std::string(kArkitBlendshapeNames[k]), std::to_string(0.01 * static_cast<double>(k + r)));
+        (text += ",") += cell(std::string(kArkitBlendshapeNames[k]), std::to_string(0.01 * static_cast<double>(k + r)));
       }
-      for (const char* name : kOthers) text += "," + cell(name, "0.0");
+      for (const char* name : kOthers) (text += ",") += cell(name, "0.0");
       text += newline;
     }
     return text;
