@@ -35,7 +35,9 @@ TEST_F(Inspect, FeaturePointsOfARigAreThoseThatItWasRiggedWith) {
   }
   EXPECT_EQ(rig["vertices"], vertices.size());
   for (const auto& [id, point] : rig["feature_points"].items()) {
-    if (given[id].is_number()) EXPECT_EQ(point["vertex"], given[id]) << id;
+    if (given[id].is_number()) {
+      EXPECT_EQ(point["vertex"], given[id]) << id;
+    }
     if (!point["vertex"].is_number()) continue;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       EXPECT_NEAR(point["position"][axis].get<double>(), vertices[point["vertex"].get<std::size_t>()][axis], 1e-4)
@@ -64,7 +66,10 @@ TEST_F(Inspect, TakeTellsFramesAndGaps) {
   auto frames = syntheticPerformance({.frames = 61});
   frames.erase(frames.begin() + 20, frames.begin() + 23);
   {
-    protocol::TakeWriter writer(path("t.take"), {.name = "demo", .layout = "ibug68"});
+    protocol::TakeHeader header;
+    header.name = "demo";
+    header.layout = "ibug68";
+    protocol::TakeWriter writer(path("t.take"), header);
     for (const LandmarkFrame& frame : frames) ASSERT_TRUE(writer.append(frame, "webcam").ok());
     ASSERT_TRUE(writer.finish().ok());
   }

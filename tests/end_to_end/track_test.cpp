@@ -50,7 +50,9 @@ TEST_F(Track, WritesTheHeaderThatOthersRelyOnAndARowPerRow) {
   EXPECT_EQ(weights.at("timestamp")[3], "0.0500");
   for (const auto& [name, column] : weights) {
     for (const std::string& cell : column) {
-      if (!cell.empty()) EXPECT_TRUE(std::isfinite(std::strtod(cell.c_str(), nullptr))) << name;
+      if (!cell.empty()) {
+        EXPECT_TRUE(std::isfinite(std::strtod(cell.c_str(), nullptr))) << name;
+      }
     }
   }
   EXPECT_EQ(weights.at("tongueOut")[20], "");  // 68 points show no tongue: unknown, not zero
@@ -109,7 +111,7 @@ TEST_F(Track, ATakeIsReadWhileItIsBeingWritten) {
   const auto frames = syntheticPerformance({.frames = 90});
   protocol::TakeWriterOptions options;
   options.commit_interval_ms = 10;
-  protocol::TakeWriter writer(path("live.take"), {.name = "live", .layout = "ibug68"}, options);
+  protocol::TakeWriter writer(path("live.take"), protocol::TakeHeader(), options);
   for (const LandmarkFrame& frame : frames) ASSERT_TRUE(writer.append(frame, "webcam").ok());
   for (int i = 0; i < 500 && writer.counters().committed < frames.size(); ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));

@@ -36,7 +36,7 @@ TEST(Performance, TakeGivesBackTheFramesThatWereRecorded) {
   auto frames = test::syntheticPerformance({.frames = 10});
   frames.erase(frames.begin() + 4);  // a frame that the camera lost
   {
-    protocol::TakeWriter writer((folder / "t.csv").string(), {.name = "t", .layout = "ibug68"});
+    protocol::TakeWriter writer((folder / "t.csv").string(), protocol::TakeHeader());
     for (const LandmarkFrame& frame : frames) ASSERT_TRUE(writer.append(frame, "webcam").ok());
     ASSERT_TRUE(writer.finish().ok());
   }
@@ -56,7 +56,7 @@ TEST(Performance, TakeGivesBackTheFramesThatWereRecorded) {
 TEST(Performance, TakeWithoutLandmarksIsPlayedFromItsMasks) {
   test::TemporaryDir folder;
   {
-    protocol::TakeWriter writer((folder / "t.take").string(), {});
+    protocol::TakeWriter writer((folder / "t.take").string(), protocol::TakeHeader());
     MaskFrame mask;
     for (int i = 0; i < 5; ++i) {
       mask.t_capture_ns = 9'000'000'000'123 + i * 10'000'000;
@@ -85,6 +85,8 @@ TEST(Performance, LiveLinkWeightsGoStraightThroughTheTable) {
   EXPECT_FLOAT_EQ(mask.arkit_weights[tongue], 0.5F);
   EXPECT_TRUE(mask.arkit_observed[tongue]);
   EXPECT_TRUE(mask.head.observed);
+  EXPECT_GT(mask.head.rotation[3], 0.98F);  // the rotation says the same as the angles
+  EXPECT_LT(mask.head.rotation[3], 0.9999F);
   const auto column = rig::ExpressionTable::standard().basis().col(static_cast<Eigen::Index>(jaw));
   const std::size_t chin = *rig::featurePointIndex("2.1");
   EXPECT_LT(column(static_cast<Eigen::Index>(3 * chin + 1)), -0.1);  // an opening jaw takes the chin down

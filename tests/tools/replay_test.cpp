@@ -53,7 +53,10 @@ class ReplayTest : public testing::Test {
   }
 
   void receive(const std::string& endpoint) {
-    protocol::Subscriber subscriber({.endpoint = endpoint, .receive_high_water_mark = 1000});
+    protocol::SubscriberOptions options;
+    options.endpoint = endpoint;
+    options.receive_high_water_mark = 1000;
+    protocol::Subscriber subscriber(options);
     protocol::ReceivedMessage message;
     for (;;) {
       const bool ending = done_;

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "tools/cli/output_file.h"
+#include "tools/picture/contact_sheet.h"
 #include "tools/picture/head_renderer.h"
 #include "tools/picture/png.h"
-#include "tools/picture/text.h"
 
 namespace volto::cli {
 
@@ -102,18 +102,14 @@ void PictureBaker::frame(std::size_t number, std::int64_t t_ns, const AvatarFram
 void PictureBaker::finish() {
   State& s = *state_;
   if (!s.options.sheet) return;
-  const std::size_t columns = std::min(kSheetColumns, s.moments.size());
-  const std::size_t rows = (s.moments.size() + columns - 1) / columns;
-  picture::Picture sheet(static_cast<int>(columns) * kTile_px, static_cast<int>(rows) * kTile_px);
-  for (std::size_t i = 0; i < s.moments.size(); ++i) {
-    const State::Moment& moment = s.moments[i];
+  std::vector<picture::Cell> cells;
+  for (const State::Moment& moment : s.moments) {
     if (moment.vertices.empty()) continue;
-    const int x = static_cast<int>(i % columns) * kTile_px, y = static_cast<int>(i / columns) * kTile_px;
-    picture::paste(sheet, s.render(moment.head, moment.vertices), x, y);
-    char label[32];
-    std::snprintf(label, sizeof label, "%.2f s", static_cast<double>(moment.t_ns) * 1e-9);
-    picture::drawText(sheet, static_cast<float>(x) + 10.0F, static_cast<float>(y + kTile_px) - 10.0F, label);
+    char caption[32];
+    std::snprintf(caption, sizeof caption, "%.2f s", static_cast<double>(moment.t_ns) * 1e-9);
+    cells.push_back({s.render(moment.head, moment.vertices), caption});
   }
+  const picture::Picture sheet = picture::contactSheet(cells, std::min(kSheetColumns, cells.size()));
   picture::writePng(s.options.path, sheet);
 }
 

@@ -1,5 +1,7 @@
 #include "tools/pipeline/weights_to_mask.h"
 
+#include "tracker/head_pose.h"
+
 namespace volto::pipeline {
 
 void maskFromWeights(const WeightFrame& in, const rig::ExpressionTable& table, MaskFrame& out) {
@@ -11,7 +13,11 @@ void maskFromWeights(const WeightFrame& in, const rig::ExpressionTable& table, M
   out.confidence = 1.0F;
   table.apply(in.weights, out.displacement_fapu);
   out.point_confidence.fill(1.0F);
-  out.head = in.head;
+  if (in.head.observed) {
+    // A WeightFrame counts pitch upward, head_pose.h downward.
+    const tracker::HeadAngles angles{in.head.yaw_rad, -in.head.pitch_rad, in.head.roll_rad};
+    tracker::setHeadPose(tracker::headRotation(angles), Eigen::Vector3d::Zero(), out.head);
+  }
   out.gaze = in.gaze;
   out.arkit_weights = in.weights;
   out.arkit_observed = in.observed;
