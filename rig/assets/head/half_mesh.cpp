@@ -62,6 +62,8 @@ constexpr std::array<ColumnAngles, 10> kColumnTable{{
     {20, {0, 12.8, 25.7, 38.5, 51.4, 64.3, 77, 90, 102, 115, 128, 141, 154, 167, 180}},
 }};
 
+constexpr Vec3 kNostril{0.70, -4.36, 9.98}, kNostrilInward{-0.05, 0.85, -0.50};
+
 double columnAngle(int row, int column) {
   std::size_t k = 0;
   while (k + 2 < kColumnTable.size() && kColumnTable[k + 1].row <= row) ++k;
@@ -200,14 +202,19 @@ class CageBuilder {
     }
   }
 
-  std::vector<int> skinRing(const std::vector<int>& block, Strip strip, double ring, double t, bool open) {
+  // A free ring between a block's outline and the first ring that is held by its strip; it keeps strip coordinates all
+  // the same.
+  std::vector<int> skinRing(const std::vector<int>& block, Strip strip, double held, double ring, double t, bool open) {
     std::vector<int> out;
     for (std::size_t i = 0; i < block.size(); ++i) {
-      const Vec3 inner = stripPoint(strip, ring, static_cast<double>(i));
+      const Vec3 inner = stripPoint(strip, held, static_cast<double>(i));
       const bool midline = open && (i == 0 || i + 1 == block.size());
       Vec3 p = lerp(at(block[i]), inner, t);
       if (midline) p.x = 0;
       out.push_back(addSkin(projectToSkin(p), midline));
+      mesh_.vertices.back().strip = strip;
+      mesh_.vertices.back().ring = ring;
+      mesh_.vertices.back().around = static_cast<double>(i);
     }
     return out;
   }
@@ -225,8 +232,8 @@ class CageBuilder {
     for (int r = kEyeTop; r < kEyeBottom; ++r) block.push_back(grid(r, kEyeOuter));
     for (int c = kEyeOuter; c > kEyeInner; --c) block.push_back(grid(kEyeBottom, c));
     for (int r = kEyeBottom; r > kMiddle; --r) block.push_back(grid(r, kEyeInner));
-    const auto orbit = skinRing(block, Strip::eye, kLidMarginFront, 0.34, false);
-    const auto fold = skinRing(block, Strip::eye, kLidMarginFront, 0.68, false);
+    const auto orbit = skinRing(block, Strip::eye, kLidMarginFront, 1, 0.34, false);
+    const auto fold = skinRing(block, Strip::eye, kLidMarginFront, 2, 0.68, false);
     const auto front = stripRing(Strip::eye, kLidMarginFront, kEyeAround, false);
     const auto back = stripRing(Strip::eye, kLidMarginBack, kEyeAround, false);
     const auto pocket = stripRing(Strip::eye, kLidPocket, kEyeAround, false);
@@ -242,7 +249,7 @@ class CageBuilder {
     for (int c = 0; c < kMouthOuter; ++c) block.push_back(grid(kMouthTop, c));
     for (int r = kMouthTop; r < kMouthBottom; ++r) block.push_back(grid(r, kMouthOuter));
     for (int c = kMouthOuter; c >= 0; --c) block.push_back(grid(kMouthBottom, c));
-    const auto around = skinRing(block, Strip::mouth, kLipBorder, 0.55, true);
+    const auto around = skinRing(block, Strip::mouth, kLipBorder, 1, 0.55, true);
     std::vector<std::vector<int>> rings;
     for (double ring = kLipBorder; ring <= kMouthBack; ring += 1)
       rings.push_back(stripRing(Strip::mouth, ring, kMouthAround + 1, true));
@@ -259,13 +266,28 @@ class CageBuilder {
   void makeNostril() {
     const std::vector<int> block{grid(kNostrilRow, kNostrilColumn), grid(kNostrilRow, kNostrilColumn + 1),
                                  grid(kNostrilRow + 1, kNostrilColumn + 1), grid(kNostrilRow + 1, kNostrilColumn)};
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      HalfVertex& v = mesh_.vertices[static_cast<std::size_t>(block[i])];
+      v.strip = Strip::nostril;
+      v.around = static_cast<double>(i);
+    }
     std::vector<std::vector<int>> rings{block};
-    for (double ring = kNostrilRim; ring <= kNostrilFloor; ring += 1)
-      rings.push_back(stripRing(Strip::nostril, ring, kNostrilAround, false));
-    joinRings(rings[0], rings[1], true, Material::skin);
-    joinRings(rings[1], rings[2], true, Material::nostril);
-    joinRings(rings[2], rings[3], true, Material::nostril);
-    addPolygon({rings[3][0], rings[3][3], rings[3][2], rings[3][1]}, Material::nostril);
+    for (const double t : {0.22, 0.38, 0.52, 0.70}) {
+      std::vector<int> ring;
+      for (std::size_t i = 0; i < block.size(); ++i) {
+        ring.push_back(addSkin(
+            projectToSkin(lerp(at(block[i]), castToSkin(kNostril - kNostrilInward * 1.1, kNostrilInward), t)), false));
+        mesh_.vertices.back().strip = Strip::nostril;
+        mesh_.vertices.back().ring = static_cast<double>(rings.size());
+        mesh_.vertices.back().around = static_cast<double>(i);
+      }
+      rings.push_back(ring);
+    }
+    for (std::size_t k = 0; k + 1 < rings.size(); ++k)
+      joinRings(rings[k], rings[k + 1], true,
+                static_cast<double>(k) < kNostrilRim ? Material::skin : Material::nostril);
+    const auto& f = rings.back();
+    addPolygon({f[0], f[3], f[2], f[1]}, Material::nostril);
   }
 
   void makeEar() {
@@ -303,14 +325,15 @@ void place(HalfVertex& v) {
 HalfVertex between(const std::vector<HalfVertex>& vertices, const std::vector<int>& of) {
   HalfVertex out;
   const double n = static_cast<double>(of.size());
-  bool strip = true, linear = false, midline = true, border = true;
+  bool strip = true, held = true, linear = false, midline = true, border = true;
   const HalfVertex& first = vertices[static_cast<std::size_t>(of[0])];
   const int period = stripPeriod(first.strip);
   double lowest = 1e9, highest = -1e9;
   for (const int i : of) {
     const HalfVertex& v = vertices[static_cast<std::size_t>(i)];
     out.position = out.position + v.position;
-    strip = strip && v.hold == Hold::strip && v.strip == first.strip;
+    strip = strip && v.strip != Strip::none && v.strip == first.strip;
+    held = held && v.hold == Hold::strip;
     linear = linear || v.hold == Hold::linear;
     midline = midline && v.midline;
     border = border && v.border;
@@ -327,11 +350,11 @@ HalfVertex between(const std::vector<HalfVertex>& vertices, const std::vector<in
   out.position = out.position * (1 / n);
   out.midline = midline && of.size() == 2;
   out.border = border && of.size() == 2;
-  if (strip && highest - lowest > 1.001) linear = true;  // across a cap, not along a ring
+  if (strip && held && highest - lowest > 1.001) linear = true;  // across a cap, not along a ring
   if (linear) {
     out.hold = Hold::linear;
   } else if (strip) {
-    out.hold = Hold::strip;
+    out.hold = held ? Hold::strip : Hold::skin;
     out.strip = first.strip;
     out.ring /= n;
     out.around /= n;
@@ -398,6 +421,12 @@ void raiseHair(HalfMesh& mesh, double thickness) {
   }
 }
 
+void sinkNostrils(HalfMesh& mesh) {
+  for (HalfVertex& v : mesh.vertices)
+    if (v.strip == Strip::nostril && v.ring > kNostrilRim)
+      v.position = v.position + kNostrilInward * (0.34 * std::sqrt(v.ring - kNostrilRim));
+}
+
 void relax(HalfMesh& mesh, int rounds, double strength) {
   const std::size_t n = mesh.vertices.size();
   std::vector<std::vector<int>> neighbours(n);
@@ -437,7 +466,12 @@ void relax(HalfMesh& mesh, int rounds, double strength) {
           const HalfVertex& other = mesh.vertices[static_cast<std::size_t>(j)];
           if (v.border && !other.border) continue;
           // On the midline the mirrored neighbour pulls as much as the one we have.
-          const double w = v.midline && !other.midline ? 2 : 1;
+          double w = v.midline && !other.midline ? 2 : 1;
+          // Along a ring around a hole the pull is weak: a ring that shortens itself would slip into the hole.
+          if ((v.strip == Strip::eye || v.strip == Strip::mouth) && v.strip == other.strip && v.ring == other.ring)
+            w *= 0.15;
+          // Rings that end in nothing would draw together on a point: the outer neighbour pulls more.
+          if (v.strip == Strip::nostril && (other.strip != Strip::nostril || other.ring < v.ring)) w *= 2.3;
           sum = sum + other.position * w;
           weight += w;
         }

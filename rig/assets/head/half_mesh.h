@@ -64,6 +64,9 @@ HalfMesh split(const HalfMesh& coarse);
 // Raises the hair off the skull by up to `thickness`, ramping up from the hair line.
 void raiseHair(HalfMesh& mesh, double thickness);
 
+// Sinks the skin within the nostrils' rims.
+void sinkNostrils(HalfMesh& mesh);
+
 // Evens out the skin vertices: each moves toward the middle of its neighbours by `strength` and back onto the field.
 void relax(HalfMesh& mesh, int rounds, double strength);
 

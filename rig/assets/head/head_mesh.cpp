@@ -163,6 +163,7 @@ Head makeHead() {
   skin = split(skin);
   relax(skin, 8, 0.5);
   raiseHair(skin, 0.24);
+  sinkNostrils(skin);
 
   Head head;
   append(head, skin, "skin");  // first, so that a vertex of the left half keeps its number

@@ -69,7 +69,10 @@ HalfMesh makeTeeth(const Arch& arch, double width_scale) {
   std::array<double, kSamples + 1> arc{};
   const double depth = arch.front_z - arch.back_z;
   const auto ellipse = [&](double a, double inward) {
-    return Vec3{(arch.half_width - inward) * std::sin(a), 0, arch.back_z + (depth - inward) * std::cos(a)};
+    // Flatter in front than an ellipse, as a row of incisors is.
+    const double s = std::sin(a), c = std::cos(a);
+    const double across = s > 0 ? std::pow(s, 0.80) : 0, along = c > 1e-9 ? std::pow(c, 0.80) : 0;
+    return Vec3{(arch.half_width - inward) * across, 0, arch.back_z + (depth - inward) * along};
   };
   for (std::size_t i = 1; i <= kSamples; ++i)
     arc[i] = arc[i - 1] + length(ellipse(kPi / 2 * static_cast<double>(i) / kSamples, 0) -
@@ -161,8 +164,8 @@ HalfMesh makeEyeball() {
   return mesh;
 }
 
-HalfMesh makeUpperTeeth() { return makeTeeth({2.55, 9.12, 5.6, -6.05, -6.98}, 0.92); }
-HalfMesh makeLowerTeeth() { return makeTeeth({2.35, 8.86, 5.5, -7.75, -6.88}, 0.84); }
+HalfMesh makeUpperTeeth() { return makeTeeth({2.60, 8.95, 5.6, -6.05, -6.98}, 0.92); }
+HalfMesh makeLowerTeeth() { return makeTeeth({2.40, 8.70, 5.5, -7.75, -6.88}, 0.84); }
 
 HalfMesh makeTongue() {
   HalfMesh mesh;
@@ -171,10 +174,10 @@ HalfMesh makeTongue() {
     const double t = (row + 0.35) / (kAlong + 0.35);
     const double a = kPi * column / kAround;
     const double width = 1.45 * std::sqrt(1 - (1 - t) * (1 - t) * (1 - t) * (1 - t)),
-                 thick = 0.20 + 0.42 * std::sqrt(t);
+                 thick = 0.18 + 0.34 * std::sqrt(t);
     const double groove =
         0.10 * smoothstep(0.05, 0.4, t) * (1 - smoothstep(0.0, 0.35, std::sin(a))) * (column < kAround / 2 ? 1 : 0);
-    const Vec3 p{width * std::sin(a), -7.45 + 0.35 * t + thick * std::cos(a) - groove, 8.25 - 3.0 * t};
+    const Vec3 p{width * std::sin(a), -7.55 + 0.12 * t + thick * std::cos(a) - groove, 8.0 - 3.0 * t};
     return vertex(p, column == 0 || column == kAround);
   };
   addSheet(
@@ -182,13 +185,13 @@ HalfMesh makeTongue() {
       [](int, int) { return Material::tongue; });
   // Tip: a fan from the middle.
   const int centre = static_cast<int>(mesh.vertices.size());
-  mesh.vertices.push_back(vertex({0, -7.45, 8.30}, true));
+  mesh.vertices.push_back(vertex({0, -7.55, 8.05}, true));
   for (int c = 0; c < kAround; ++c) {
     const int row = kAlong * (kAround + 1);
     mesh.polygons.push_back({{row + c, centre, row + c + 1}, Material::tongue});
   }
   const int root = static_cast<int>(mesh.vertices.size());
-  mesh.vertices.push_back(vertex({0, -7.1, 5.15}, true));
+  mesh.vertices.push_back(vertex({0, -7.43, 4.9}, true));
   for (int c = 0; c < kAround; ++c) mesh.polygons.push_back({{root, c, c + 1}, Material::tongue});
   return mesh;
 }

@@ -107,25 +107,11 @@ Vec3 mouthPoint(double ring, double around) {
   const double spread = std::sqrt(open * (2 - open));
   const Vec3 contact{rim.x * 0.985, rim.y + up * 0.01 * open, rim.z - 0.30};
   if (ring <= kMouthVestibule) return lerp(rim, contact, clamp01(ring - kLipRim));
-  const Vec3 middle{rim.x * 1.05, -6.66 + up * (0.10 + (up > 0 ? 1.25 : 1.45) * spread),
-                    rim.z - 0.62 - 0.5 * (1 - open)};
+  const Vec3 middle{rim.x * 1.05, -6.66 + up * (0.10 + (up > 0 ? 1.20 : 1.10) * spread),
+                    rim.z - (up > 0 ? 0.65 : 0.85) - 0.4 * (1 - open)};
   if (ring <= 6) return lerp(contact, middle, ring - kMouthVestibule);
   const Vec3 back{rim.x * 1.0, -6.75 + up * (0.12 + (up > 0 ? 1.3 : 1.5) * spread), 4.6 - 0.4 * spread};
   return lerp(middle, back, clamp01(ring - 6));
-}
-
-// --- Nostril
-// ---------------------------------------------------------------------------------------------------------------------
-
-Vec3 nostrilPoint(double ring, double around) {
-  const double a = (around + 0.5) * (kPi / 2);  // 0: front, towards the middle; 1: front, outward; then behind
-  const Vec3 centre{0.66, -4.35, 10.0};
-  const Vec3 across{0.24, 0.03, -0.09}, along{-0.09, 0.10, 0.31};
-  const Vec3 inward{-0.05, 0.85, -0.50};
-  const double grow = 1.0 - 0.25 * clamp01((ring - 2) / 1.0);
-  const Vec3 target = centre - across * (std::cos(a) * grow) + along * (std::sin(a) * grow);
-  const Vec3 rim = castToSkin(target - inward * 1.1, inward);
-  return rim + inward * (0.30 * (ring - kNostrilRim));
 }
 
 // --- Ear
@@ -200,8 +186,7 @@ Vec3 stripPoint(Strip strip, double ring, double around) {
       if (around <= 0 || around >= kMouthAround) p.x = 0;
       return p;
     }
-    case Strip::nostril:
-      return nostrilPoint(ring, around);
+    case Strip::nostril:  // stays on the skin until sinkNostrils
     case Strip::ear:
       return earPoint(ring, around);
     case Strip::none:

@@ -15,8 +15,8 @@ inline constexpr int kEyeAround = 16;
 // Mouth: around 0 middle of the upper lip, 5 corner, 10 middle of the lower lip (left half, not closed).
 inline constexpr double kLipBorder = 2, kLipRim = 4, kMouthVestibule = 5, kMouthBack = 7;
 inline constexpr int kMouthAround = 10;
-// Nostril: period 4. Ear: period 12, 0 in front, 3 on top.
-inline constexpr double kNostrilRim = 1, kNostrilFloor = 3;
+// Nostril: period 4, on the skin; what lies within the rim is sunk at the end. Ear: period 12, 0 in front, 3 on top.
+inline constexpr double kNostrilRim = 2, kNostrilFloor = 4;
 inline constexpr int kNostrilAround = 4;
 inline constexpr double kEarRoot = 1, kEarFloor = 8;
 inline constexpr int kEarAround = 12;
