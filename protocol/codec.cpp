@@ -545,6 +545,16 @@ Result decodeStamp(Bytes bytes, Stamp& out) {
   return Result::bad("not a message: unknown identifier");
 }
 
+Result Inspector::checkMesh(Bytes bytes, Stamp& stamp) {
+  return readTable<wire::Mesh>(bytes, stamp, [&](const wire::Mesh& t) {
+    readPose(t, stamp, avatar_.frame);
+    const std::size_t count = t.vertices()->size();
+    if (Result r = validateMesh(avatar_.frame, count); !r) return r;
+    const std::span<const float> values(reinterpret_cast<const float*>(t.vertices()->Data()), count * 3);
+    return allFinite(values) ? Result{} : Result::bad("a vertex is not finite");
+  });
+}
+
 Result Inspector::check(Bytes bytes, Stamp& stamp) {
   const std::optional<MessageKind> kind = messageKind(bytes);
   if (!kind) return Result::bad("not a message: unknown identifier");

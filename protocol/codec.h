@@ -69,6 +69,8 @@ class Inspector {
   Result check(Bytes bytes, Stamp& stamp);
 
  private:
+  Result checkMesh(Bytes bytes, Stamp& stamp);
+
   LandmarkMessage landmarks_;
   MaskMessage mask_;
   AvatarMessage avatar_;
