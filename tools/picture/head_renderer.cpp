@@ -52,33 +52,22 @@ struct HeadRenderer::State {
 };
 
 HeadRenderer::State::State(const rig::Mesh& mesh, const Look& given) : look(given) {
-  if (mesh.polygonCount() == 0 || mesh.vertexCount() == 0) {
-    throw std::invalid_argument("the mesh has no polygons; nothing can be drawn");
-  }
+  checkDrawable(mesh);
   if (look.polygon_surface.size() != mesh.polygonCount() || look.surfaces.empty() ||
       (!look.vertex_tint.empty() && look.vertex_tint.size() != mesh.vertexCount())) {
     throw std::invalid_argument("the look was made for another mesh");
   }
-  const auto vertices = static_cast<std::uint32_t>(mesh.vertexCount());
   for (std::size_t p = 0; p < mesh.polygonCount(); ++p) {
     const std::uint32_t begin = mesh.polygon_start[p], end = mesh.polygon_start[p + 1];
-    if (begin > end || end > mesh.corner_vertices.size() || look.polygon_surface[p] >= look.surfaces.size()) {
-      throw std::invalid_argument("polygon " + std::to_string(p) + " of the mesh is damaged");
-    }
-    for (std::uint32_t c = begin; c < end; ++c) {
-      if (mesh.corner_vertices[c] >= vertices) {
-        throw std::invalid_argument("polygon " + std::to_string(p) + " names vertex " +
-                                    std::to_string(mesh.corner_vertices[c]) + ", the mesh has " +
-                                    std::to_string(vertices));
-      }
-    }
+    if (look.polygon_surface[p] >= look.surfaces.size())
+      throw std::invalid_argument("the look was made for another mesh");
     if (!look.surfaces[look.polygon_surface[p]].drawn) continue;
     for (std::uint32_t c = begin + 2; c < end; ++c) {
       triangles.push_back({mesh.corner_vertices[begin], mesh.corner_vertices[c - 1], mesh.corner_vertices[c]});
       surface.push_back(look.polygon_surface[p]);
     }
   }
-  neutral.reserve(vertices);
+  neutral.reserve(mesh.vertexCount());
   Vec3 low{1e30F, 1e30F, 1e30F}, high{-1e30F, -1e30F, -1e30F};
   for (Eigen::Index v = 0; v < mesh.positions.rows(); ++v) {
     const Vec3 p = rowOf(mesh.positions, v);
@@ -87,7 +76,6 @@ HeadRenderer::State::State(const rig::Mesh& mesh, const Look& given) : look(give
     low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
     high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
   }
-  if (low.x > high.x) throw std::invalid_argument("nothing to draw: no vertex has a finite position");
   head_size = std::max(length(high - low), 1e-20F);
   focus = neutral;
 }

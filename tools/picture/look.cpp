@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <stdexcept>
 
 namespace volto::picture {
 namespace {
@@ -175,6 +176,28 @@ Look lookByShape(const rig::Mesh& mesh) {
 
 }  // namespace
 
+void checkDrawable(const rig::Mesh& mesh) {
+  if (mesh.polygonCount() == 0 || mesh.vertexCount() == 0) {
+    throw std::invalid_argument("the mesh has no polygons; nothing can be drawn");
+  }
+  for (std::size_t p = 0; p < mesh.polygonCount(); ++p) {
+    const std::uint32_t begin = mesh.polygon_start[p], end = mesh.polygon_start[p + 1];
+    if (begin >= end || end > mesh.corner_vertices.size()) {
+      throw std::invalid_argument("polygon " + std::to_string(p) + " of the mesh is damaged");
+    }
+    for (std::uint32_t c = begin; c < end; ++c) {
+      if (mesh.corner_vertices[c] >= mesh.vertexCount()) {
+        throw std::invalid_argument("polygon " + std::to_string(p) + " names vertex " +
+                                    std::to_string(mesh.corner_vertices[c]) + ", the mesh has " +
+                                    std::to_string(mesh.vertexCount()));
+      }
+    }
+  }
+  bool any = false;
+  for (Eigen::Index v = 0; v < mesh.positions.rows() && !any; ++v) any = mesh.positions.row(v).allFinite();
+  if (!any) throw std::invalid_argument("nothing to draw: no vertex has a finite position");
+}
+
 Surface surfaceByName(std::string_view name) {
   std::string lower(name);
   for (char& c : lower) {
@@ -187,6 +210,7 @@ Surface surfaceByName(std::string_view name) {
 }
 
 Look lookOf(const rig::Mesh& mesh) {
+  checkDrawable(mesh);
   if (mesh.materials.empty() || mesh.polygon_material.size() != mesh.polygonCount()) return lookByShape(mesh);
   Look look;
   const std::array<float, 3> unset = rig::Mesh::Material{}.colour;

@@ -37,6 +37,10 @@ struct Look {
   std::vector<Eyeball> eyeballs;
 };
 
+// Throws std::invalid_argument for a mesh without polygons, with a vertex index out of range or without any finite
+// position.
+void checkDrawable(const rig::Mesh& mesh);
+
 // A surface as the well-known names of parts say ("skin", "lips", "iris", "pupil", "eye_white", "teeth", "eyelashes",
 // ...; matched inside the name, upper and lower case alike). Skin for a name that says nothing.
 Surface surfaceByName(std::string_view name);
@@ -44,6 +48,7 @@ Surface surfaceByName(std::string_view name);
 // The mesh's materials: their own colour where the file gives one, else by name. A mesh without materials: skin, with
 // separate components told by their shape (eyeballs get an iris that looks along +z; thin films over them are left
 // out).
+// Throws as checkDrawable does.
 Look lookOf(const rig::Mesh& mesh);
 
 }  // namespace volto::picture

@@ -62,7 +62,7 @@ constexpr std::array<Glyph, 95> kGlyphs{{
     {4, "0i0c4c"},                            // L
     {5, "0c0i2e3e5i5c"},                      // M
     {4, "0c0i4c4i"},                          // N
-    {4, "1c0d0h1i3i4h4d3c1c"},                // O
+    {4, "1c0e0g1i3i4g4e3c1c"},                // O
     {4, "0c0i3i4h4g3f0f"},                    // P
     {4, "1c0d0h1i3i4h4d3c1c 2e4b"},           // Q
     {4, "0c0i3i4h4g3f0f 2f4c"},               // R
