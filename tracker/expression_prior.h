@@ -23,12 +23,14 @@ class ExpressionPrior {
 
   // Second moment about zero: a weight's usual size. Symmetric, positive definite; correlations times `correlation` (0..1), so that
   // what a few people do together does not become a rule for everybody.
-  ShapeMatrix secondMoment(double correlation) const { return covariance(rms_, correlation); }
+  ShapeMatrix secondMoment(double correlation) const { return covarianceOf(rms_, correlation); }
   // Covariance about a recording's own mean.
-  ShapeMatrix deviation(double correlation) const { return covariance(deviation_, correlation); }
+  ShapeMatrix deviation(double correlation) const { return covarianceOf(deviation_, correlation); }
+
+  // Covariance of somebody who uses each shape by `scale`. A scale below a floor is taken to be the floor.
+  ShapeMatrix covarianceOf(const ShapeVector& scale, double correlation) const;
 
  private:
-  ShapeMatrix covariance(const ShapeVector& scale, double correlation) const;
 
   ShapeVector rms_ = ShapeVector::Zero();
   ShapeVector deviation_ = ShapeVector::Zero();

@@ -6,7 +6,7 @@
 #include <Eigen/QR>
 #include <cmath>
 
-#include "rig/control_mask.h"
+#include "tracker/mean_face.h"
 
 namespace volto::tracker {
 namespace {
@@ -79,7 +79,7 @@ MeasuredPoints measuredPoints(const LayoutTable& layout) {
 }
 
 ShapePrior::ShapePrior(const MeasuredPoints& points, const Settings& settings) : points_(points) {
-  const rig::FeaturePointPositions& face = rig::referenceMask();
+  const rig::FeaturePointPositions& face = meanFace();
   const Eigen::Map<const Eigen::VectorXd> flat(face.data(), kAll);
   mean_ = rowsOf(flat, points);
 
@@ -106,7 +106,7 @@ ShapePrior::ShapePrior(const MeasuredPoints& points, const Settings& settings) :
 }
 
 rig::FeaturePointPositions ShapePrior::complete(const Eigen::VectorXd& deviation) const {
-  rig::FeaturePointPositions face = rig::referenceMask();
+  rig::FeaturePointPositions face = meanFace();
   Eigen::Map<Eigen::VectorXd>(face.data(), kAll) += fill_ * deviation;
   for (int p = 0; p < points_.count(); ++p)
     face.row(points_.feature[static_cast<std::size_t>(p)]) = (mean_ + deviation).segment<3>(3 * p).transpose();
@@ -114,30 +114,27 @@ rig::FeaturePointPositions ShapePrior::complete(const Eigen::VectorXd& deviation
 }
 
 ExpressionBasis::ExpressionBasis(const MeasuredPoints& points, const rig::ExpressionTable& table)
-    : points_(points), table_(&table), basis_(3 * points.count(), kShapes) {
-  fitTo(rig::referenceMask());
+    : points_(points), table_(&table) {
+  for (Eigen::MatrixXf& axis : axes_) axis.setZero(points.count(), kShapes);
+  fitTo(meanFace());
 }
 
 void ExpressionBasis::fitTo(const rig::FeaturePointPositions& neutral_mm) {
   const rig::FeaturePointPositions scale = rig::fapuScale(rig::measureFapu(neutral_mm).fapu);
-  for (int p = 0; p < points_.count(); ++p) {
-    const int feature = points_.feature[static_cast<std::size_t>(p)];
-    for (int c = 0; c < 3; ++c) basis_.row(3 * p + c) = table_->basis().row(3 * feature + c) * scale(feature, c);
-  }
-  constexpr std::array<std::array<int, 2>, 6> kAxes = {{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}}};
-  for (std::size_t g = 0; g < kAxes.size(); ++g) {
-    gram_[g].setZero();
+  for (int k = 0; k < kShapes; ++k)
     for (int p = 0; p < points_.count(); ++p) {
-      const auto a = basis_.row(3 * p + kAxes[g][0]);
-      const auto b = basis_.row(3 * p + kAxes[g][1]);
-      if (kAxes[g][0] == kAxes[g][1]) {
-        gram_[g].noalias() += (points_.trust[p] * a.transpose()) * a;
-      } else {
-        gram_[g].noalias() += (points_.trust[p] * a.transpose()) * b;
-        gram_[g].noalias() += (points_.trust[p] * b.transpose()) * a;
-      }
+      const int feature = points_.feature[static_cast<std::size_t>(p)];
+      for (int c = 0; c < 3; ++c)
+        axes_[static_cast<std::size_t>(c)](p, k) =
+            static_cast<float>(table_->basis()(3 * feature + c, k) * scale(feature, c));
     }
-  }
+}
+
+Eigen::MatrixXd ExpressionBasis::interleaved() const {
+  Eigen::MatrixXd all(3 * points_.count(), kShapes);
+  for (int p = 0; p < points_.count(); ++p)
+    for (std::size_t c = 0; c < 3; ++c) all.row(3 * p + static_cast<int>(c)) = axes_[c].row(p).cast<double>();
+  return all;
 }
 
 }  // namespace volto::tracker

@@ -24,7 +24,7 @@ struct MeasuredPoints {
 };
 MeasuredPoints measuredPoints(const LayoutTable& layout);
 
-// How faces at rest differ from rig::referenceMask().
+// How faces at rest differ from meanFace().
 class ShapePrior {
  public:
   ShapePrior(const MeasuredPoints& points, const Settings& settings);
@@ -51,16 +51,15 @@ class ExpressionBasis {
   // For a face at rest. Allocates nothing after construction.
   void fitTo(const rig::FeaturePointPositions& neutral_mm);
 
-  const Eigen::MatrixXd& matrix() const { return basis_; }  // 3P by 52, millimetres
-  // Sum over points of trust * B_a^T B_b for the axes xx, yy, zz, xy, xz, yz: with them, the normal equations of any view of the head
-  // are a sum of six matrices.
-  const std::array<ShapeMatrix, 6>& gram() const { return gram_; }
+  // P by 52 for x, y and z, millimetres.
+  const std::array<Eigen::MatrixXf, 3>& axes() const { return axes_; }
+  // 3P by 52, the same with x, y, z of a point together.
+  Eigen::MatrixXd interleaved() const;
 
  private:
   MeasuredPoints points_;
   const rig::ExpressionTable* table_;
-  Eigen::MatrixXd basis_;
-  std::array<ShapeMatrix, 6> gram_;
+  std::array<Eigen::MatrixXf, 3> axes_;
 };
 
 }  // namespace volto::tracker

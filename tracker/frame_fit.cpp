@@ -34,46 +34,37 @@ void moveHead(const Eigen::Matrix<double, 6, 1>& step, ViewPose& pose) {
 
 FrameFit::FrameFit(const MeasuredPoints& points, const Settings& settings)
     : points_(points), variance_(settings.point_noise_mm * settings.point_noise_mm), outlier_mm_(settings.outlier_mm) {
-  const int size = 3 * points.count();
-  neutral_ = position_ = gradient_ = residual_ = Eigen::VectorXd::Zero(size);
+  const int size = points.count();
+  neutral_ = position_ = gradient_ = residual_ = Eigen::VectorXd::Zero(3 * size);
+  for (auto& v : moved_) v.setZero(size);
+  for (auto& v : pull_) v.setZero(size);
+  for (auto& row : view_)
+    for (auto& v : row) v.setZero(size);
+  jacobian_.setZero(3 * size, 6 + kShapes);
+  gram_.setZero(6 + kShapes, 6 + kShapes);
 }
 
 void FrameFit::setFace(const Eigen::VectorXd& neutral, const ExpressionBasis& basis) {
   basis_ = &basis;
   neutral_ = neutral;
-  for (auto& m : pose_gram_) m.setZero();
-  for (auto& m : cross_gram_) m.setZero();
-  constexpr std::array<std::array<int, 2>, 6> kPairs = {{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}}};
-  for (int p = 0; p < points_.count(); ++p) {
-    const Eigen::Matrix<double, 3, 6> q = motionJacobian(neutral_.segment<3>(3 * p));
-    const double trust = points_.trust[p];
-    for (std::size_t k = 0; k < kPairs.size(); ++k) {
-      const auto [a, b] = kPairs[k];
-      pose_gram_[k].noalias() += trust * q.row(a).transpose() * q.row(b);
-      if (a != b) pose_gram_[k].noalias() += trust * q.row(b).transpose() * q.row(a);
-    }
-    for (int a = 0; a < 3; ++a)
-      for (int b = 0; b < 3; ++b)
-        cross_gram_[static_cast<std::size_t>(3 * a + b)].noalias() +=
-            (trust * q.row(a).transpose()) * basis_->matrix().row(3 * p + b);
-  }
 }
 
 bool FrameFit::evaluate(const Observation& seen, const ViewPose& pose, const ShapeVector& weights) {
-  position_ = neutral_;
-  for (int k = 0; k < kShapes; ++k)
-    if (weights[k] != 0) position_.noalias() += weights[k] * basis_->matrix().col(k);
+  const Eigen::Matrix<float, kShapes, 1> w = weights.cast<float>();
+  for (std::size_t c = 0; c < 3; ++c) moved_[c].noalias() = basis_->axes()[c] * w;
 
   const double distance = std::max(-pose.translation.z(), kNearestDepth);
   double sum = 0, weight_sum = 0;
-  view_.setZero();
   pose_gradient_.setZero();
+  view_rows_ = seen.has_depth ? 3 : 2;
   for (int p = 0; p < points_.count(); ++p) {
-    const Eigen::Vector3d in_head = position_.segment<3>(3 * p);
+    const Eigen::Vector3d in_head = neutral_.segment<3>(3 * p) + Eigen::Vector3d(moved_[0][p], moved_[1][p], moved_[2][p]);
+    position_.segment<3>(3 * p) = in_head;
     const Eigen::Vector3d in_view = pose.rotation * in_head + pose.translation;
     Eigen::Vector3d pull;  // A^T r
     double norm = 0;
     double cut = seen.weight[p];
+    Eigen::Matrix3d a = pose.rotation;
     if (seen.has_depth) {
       const Eigen::Vector3d r = seen.point.col(p) - in_view;
       norm = r.norm();
@@ -84,54 +75,82 @@ bool FrameFit::evaluate(const Observation& seen, const ViewPose& pose, const Sha
       const Eigen::Vector2d at = in_view.head<2>() / depth;
       const Eigen::Vector2d r = (seen.ray.col(p) - at) * distance;  // millimetres at the head's distance
       norm = r.norm();
-      Eigen::Matrix<double, 2, 3> a;
-      a << 1, 0, at.x(), 0, 1, at.y();
-      a = (distance / depth) * a * pose.rotation;
-      pull.noalias() = a.transpose() * r;
-      view_.noalias() += points_.trust[p] * (a.transpose() * a);
+      const double enlarged = distance / depth;
+      a.row(0) = enlarged * (pose.rotation.row(0) + at.x() * pose.rotation.row(2));
+      a.row(1) = enlarged * (pose.rotation.row(1) + at.y() * pose.rotation.row(2));
+      pull.noalias() = a.topRows<2>().transpose() * r;
     }
+    for (std::size_t row = 0; row < static_cast<std::size_t>(view_rows_); ++row)
+      for (std::size_t c = 0; c < 3; ++c)
+        view_[row][c][p] = static_cast<float>(a(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(c)));
     residual_.segment<3>(3 * p) = seen.weight[p] > 0 ? pull : Eigen::Vector3d::Zero();
     sum += cut * norm * norm;
     weight_sum += cut;
     if (norm > outlier_mm_) cut *= outlier_mm_ / norm;
     pull *= cut * points_.trust[p];
     gradient_.segment<3>(3 * p) = pull;
+    for (std::size_t c = 0; c < 3; ++c) pull_[c][p] = static_cast<float>(pull[static_cast<Eigen::Index>(c)]);
     pose_gradient_.head<3>() += in_head.cross(pull);
     pose_gradient_.tail<3>() += pull;
   }
-  view_ /= points_.trust.sum();
-  if (seen.has_depth) view_.setIdentity();
   rms_mm_ = weight_sum > 0 ? std::sqrt(sum / weight_sum) : 0;
   return std::isfinite(sum);
 }
 
-void FrameFit::composeNormalMatrices() {
-  const double s = 1 / variance_;
-  const std::array<double, 6> m = {s * view_(0, 0), s * view_(1, 1), s * view_(2, 2), s * view_(0, 1), s * view_(0, 2), s * view_(1, 2)};
-  pose_information_ = Matrix6::Identity() * 1e-9;
-  for (std::size_t k = 0; k < 6; ++k) pose_information_ += m[k] * pose_gram_[k];
-  const auto& gram = basis_->gram();
-  information_ = m[0] * gram[0] + m[1] * gram[1] + m[2] * gram[2] + m[3] * gram[3] + m[4] * gram[4] + m[5] * gram[5];
-  cross_.setZero();
-  for (int a = 0; a < 3; ++a)
-    for (int b = 0; b < 3; ++b) cross_ += (s * view_(a, b)) * cross_gram_[static_cast<std::size_t>(3 * a + b)];
-  pose_inverse_ = pose_information_.inverse();
-  information_.noalias() -= cross_.transpose() * (pose_inverse_ * cross_);
+void FrameFit::composeNormalMatrices(const Observation& seen) {
+  const int size = points_.count();
+  for (int row = 0; row < view_rows_; ++row) {
+    auto& a = view_[static_cast<std::size_t>(row)];
+    // A (-[x]x, 1): the row a of A gives x cross a for rotation, a for translation.
+    for (int p = 0; p < size; ++p) {
+      const auto root = static_cast<float>(std::sqrt(points_.trust[p] * seen.weight[p] / variance_));
+      const Eigen::Vector3f x = position_.segment<3>(3 * p).cast<float>();
+      const Eigen::Vector3f direction(root * a[0][p], root * a[1][p], root * a[2][p]);
+      jacobian_.block<1, 3>(row * size + p, 0) = x.cross(direction).transpose();
+      jacobian_.block<1, 3>(row * size + p, 3) = direction.transpose();
+      for (int c = 0; c < 3; ++c) a[static_cast<std::size_t>(c)][p] = direction[c];
+    }
+    for (int k = 0; k < kShapes; ++k)
+      jacobian_.col(6 + k).segment(row * size, size).array() = a[0].array() * basis_->axes()[0].col(k).array() +
+                                                              a[1].array() * basis_->axes()[1].col(k).array() +
+                                                              a[2].array() * basis_->axes()[2].col(k).array();
+  }
+  gram_.setZero();
+  gram_.selfadjointView<Eigen::Lower>().rankUpdate(jacobian_.topRows(view_rows_ * size).transpose());
+  Matrix6 pose_information = gram_.topLeftCorner<6, 6>().selfadjointView<Eigen::Lower>().toDenseMatrix().cast<double>();
+  pose_information.diagonal().array() += 1e-9;
+  normal_.pose_inverse = pose_information.inverse();
+  normal_.cross = gram_.bottomLeftCorner<kShapes, 6>().transpose().cast<double>();
+  normal_.information = gram_.bottomRightCorner<kShapes, kShapes>().selfadjointView<Eigen::Lower>().toDenseMatrix().cast<double>();
+  normal_.information.noalias() -= normal_.cross.transpose() * (normal_.pose_inverse * normal_.cross);
+}
+
+void FrameFit::addPointInformation(const Observation& seen, Eigen::Matrix<double, 3, Eigen::Dynamic>& blocks) const {
+  for (int p = 0; p < points_.count(); ++p) {
+    const double weight = points_.trust[p] * seen.weight[p];
+    for (std::size_t row = 0; row < static_cast<std::size_t>(view_rows_); ++row) {
+      const Eigen::Vector3d a(view_[row][0][p], view_[row][1][p], view_[row][2][p]);
+      blocks.block<3, 3>(0, 3 * p).noalias() += weight * a * a.transpose();
+    }
+  }
 }
 
 bool FrameFit::improve(const Observation& seen, const WeightPrior& prior, int iterations, int sweeps, ViewPose& pose,
-                       ShapeVector& weights) {
+                       ShapeVector& weights, const NormalMatrices* kept) {
   ViewPose tried_pose = pose;
   ShapeVector tried = weights;
   if (!evaluate(seen, tried_pose, tried)) return false;
-  composeNormalMatrices();
-  posterior_ = information_ + prior.precision;
+  if (kept == nullptr) composeNormalMatrices(seen);
+  const NormalMatrices& normal = kept != nullptr ? *kept : normal_;
+  posterior_ = normal.information + prior.precision;
   for (int iteration = 0; iteration < iterations; ++iteration) {
     pose_gradient_ /= variance_;
-    const Pose6 free_pose = pose_inverse_ * pose_gradient_;
-    ShapeVector slope = basis_->matrix().transpose() * gradient_;
-    slope /= variance_;
-    slope.noalias() -= cross_.transpose() * free_pose;
+    const Pose6 free_pose = normal.pose_inverse * pose_gradient_;
+    Eigen::Matrix<float, kShapes, 1> pull = basis_->axes()[0].transpose() * pull_[0];
+    pull.noalias() += basis_->axes()[1].transpose() * pull_[1];
+    pull.noalias() += basis_->axes()[2].transpose() * pull_[2];
+    ShapeVector slope = pull.cast<double>() / variance_;
+    slope.noalias() -= normal.cross.transpose() * free_pose;
     slope.noalias() -= prior.precision * (tried - prior.mean);
     const ShapeVector before = tried;
     for (int sweep = 0; sweep < sweeps; ++sweep) {
@@ -145,7 +164,7 @@ bool FrameFit::improve(const Observation& seen, const WeightPrior& prior, int it
       }
       if (largest < 1e-4) break;
     }
-    const Pose6 step = free_pose - pose_inverse_ * (cross_ * (tried - before));
+    const Pose6 step = free_pose - normal.pose_inverse * (normal.cross * (tried - before));
     moveHead(step, tried_pose);
     if (!evaluate(seen, tried_pose, tried)) return false;
   }

@@ -71,6 +71,7 @@ NeutralFace neutralFromRest(std::span<const LandmarkFrame> rest, const TrackerOp
     fit.setFace(shape.mean() + deviation, basis);
     Eigen::VectorXd pull = Eigen::VectorXd::Zero(size);
     Eigen::MatrixXd normal = shape.precision();
+    Eigen::Matrix<double, 3, Eigen::Dynamic> blocks = Eigen::Matrix<double, 3, Eigen::Dynamic>::Zero(3, size);
     for (std::size_t i = 0; i < faces.size(); ++i) {
       Face& face = faces[i];
       ShapeVector weights = ShapeVector::Zero();
@@ -81,10 +82,9 @@ NeutralFace neutralFromRest(std::span<const LandmarkFrame> rest, const TrackerOp
       rms[i] = fit.rms_mm();
       if (rms[i] > worst) continue;
       pull += fit.gradient() / variance;
-      const Eigen::Matrix3d information = fit.pointInformation();
-      for (int p = 0; p < points.count(); ++p)
-        normal.block<3, 3>(3 * p, 3 * p) += points.trust[p] * face.seen.weight[p] * information;
+      fit.addPointInformation(face.seen, blocks);
     }
+    for (int p = 0; p < points.count(); ++p) normal.block<3, 3>(3 * p, 3 * p) += blocks.block<3, 3>(0, 3 * p) / variance;
     deviation += normal.llt().solve(pull - shape.precision() * deviation);
     if (pass >= 5) {
       // Frames that do not look like the others (a blink) are left out.
@@ -113,7 +113,13 @@ NeutralFace neutralFromTake(std::span<const LandmarkFrame> take, const TrackerOp
   NeutralEstimator estimator(points, shape, table, expression, settings, settings.take_keyframes + 1);
   for (const Face& face : faces) estimator.add(face.seen, face.pose, face.time_s);
   while (estimator.passes() < settings.take_passes || !estimator.hasResult()) estimator.work();
-  return makeNeutralFace(shape, points, estimator.neutralDeviation(), observer.scale());
+  NeutralFace face = makeNeutralFace(shape, points, estimator.neutralDeviation(), observer.scale());
+  for (std::size_t k = 0; k < kArkitBlendshapeCount; ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    face.usual[k] = static_cast<float>(estimator.usualExpression()[i]);
+    face.deviation[k] = static_cast<float>(std::sqrt(estimator.habits()(i, i)));
+  }
+  return face;
 }
 
 }  // namespace volto::tracker

@@ -8,9 +8,12 @@
 namespace volto::tracker {
 namespace {
 
+constexpr int kSweeps = 10;
+constexpr int kLinearisePeriod = 8;
 constexpr int kSolveStepsPerPiece = 4;
 constexpr int kMostSolveSteps = 60;
 constexpr int kPassesBeforeRest = 3;    // the deviations must have settled before rest is looked for
+constexpr double kMostGain = 2.0;       // by which a variance may change faster than by plain expectation maximisation
 constexpr double kBelowRest = 3.0;      // a usual expression that makes weights negative is so much less likely than one above rest
 
 }  // namespace
@@ -27,7 +30,8 @@ NeutralEstimator::NeutralEstimator(const MeasuredPoints& points, const ShapePrio
       store_(static_cast<std::size_t>(capacity)),
       interval_s_(settings.stream_interval_s) {
   const int size = 3 * points.count();
-  const Eigen::MatrixXd& b = basis_.matrix();
+  const Eigen::MatrixXd b = basis_.interleaved();
+  basis_matrix_ = b;
   // M's prior: a person's shape and a usual expression of twice the general size.
   const ShapeVector usual = 2 * expression.secondMoment(0).diagonal();
   Eigen::MatrixXd covariance = shape.covariance() + b * usual.asDiagonal() * b.transpose();
@@ -47,10 +51,14 @@ NeutralEstimator::NeutralEstimator(const MeasuredPoints& points, const ShapePrio
   sorted_.reserve(store_.size());
 }
 
-void NeutralEstimator::fixNeutral(const Eigen::VectorXd& deviation, const rig::FeaturePointPositions& neutral_mm) {
+void NeutralEstimator::fixNeutral(const Eigen::VectorXd& deviation, const rig::FeaturePointPositions& neutral_mm,
+                                  const ShapeVector& usual, const ShapeMatrix& habits) {
   fixed_ = true;
+  usual_ = usual;
+  habits_ = general_ = habits;
   neutral_ = mean_ = deviation;
   basis_.fitTo(neutral_mm);
+  basis_matrix_ = basis_.interleaved();
   stage_ = Stage::begin;
 }
 
@@ -73,6 +81,7 @@ void NeutralEstimator::add(const Observation& seen, const ViewPose& pose, double
   slot.seen.weight = seen.weight;
   slot.pose = pose;
   slot.weights.setZero();
+  slot.fits = 0;
   slot.time_s = last_time_s_ = time_s;
 }
 
@@ -124,19 +133,22 @@ void NeutralEstimator::beginPass() {
 
 void NeutralEstimator::fitOne(Stored& stored) {
   if (fixed_) stored.weights = stored.weights.cwiseMax(0.0);
-  if (!fit_.improve(stored.seen, prior_, 1, 10, stored.pose, stored.weights)) {
+  // A stored frame is linearised again now and then only: its pose hardly moves any more.
+  const bool linearise = stored.fits < 2 || stored.fits % kLinearisePeriod == 0;
+  if (!fit_.improve(stored.seen, prior_, 1, kSweeps, stored.pose, stored.weights, linearise ? nullptr : &stored.normal)) {
     // No head in this frame's points any more: start it again from the present mean.
     stored.weights.setZero();
+    stored.fits = 0;
     if (!fit_.initialisePose(stored.seen, stored.pose)) stored.seen.weight.setZero();
     return;
   }
+  if (linearise) stored.normal = fit_.normal();
+  ++stored.fits;
   pull_ += fit_.gradient();
-  const Eigen::Matrix3d information = fit_.pointInformation();
-  for (int p = 0; p < points_.count(); ++p)
-    block_.block<3, 3>(0, 3 * p) += (points_.trust[p] * stored.seen.weight[p]) * information;
+  fit_.addPointInformation(stored.seen, block_);
   sum_ += stored.weights;
   scatter_.noalias() += stored.weights * stored.weights.transpose();
-  information_ += fit_.information();
+  information_ += stored.normal.information;
 }
 
 void NeutralEstimator::endOfFrames() {
@@ -151,11 +163,11 @@ void NeutralEstimator::endOfFrames() {
   }
   // What all deviations have in common belongs to the mean face.
   for (int i = 0; i < in_pass_; ++i) store_[static_cast<std::size_t>(i)].weights -= average;
-  mean_.noalias() += basis_.matrix() * average;
+  mean_.noalias() += basis_matrix_ * average;
   // Normal equations of M's change: (mean_precision + c H) change = c pull - mean_precision M.
   const double c = std::min(1.0, std::min(settings_.independent_frames, independentFrames()) / n);
   pull_ *= c / (settings_.point_noise_mm * settings_.point_noise_mm);
-  block_ *= c;
+  block_ *= c / (settings_.point_noise_mm * settings_.point_noise_mm);
   remainder_.noalias() = pull_ - mean_precision_ * mean_;
   iterations_ = 0;
   stage_ = Stage::solve;
@@ -198,7 +210,15 @@ bool NeutralEstimator::solveSome() {
 
 void NeutralEstimator::learnHabits() {
   const ShapeMatrix open = (information_ + prior_.precision).llt().solve(ShapeMatrix::Identity());
-  ShapeMatrix seen = scatter_ + open;
+  // Expectation maximisation creeps where the points say little (its estimate grows by the share that they explain), so the scatter is
+  // scaled up to what it would settle at (D. MacKay: Bayesian interpolation, 1992: variance = scatter / well determined share).
+  ShapeVector gain;
+  for (int k = 0; k < kShapes; ++k) {
+    const double determined = std::max(1 - open(k, k) / habits_(k, k), 0.05);
+    const double plain = scatter_(k, k) + open(k, k);
+    gain[k] = std::sqrt(std::clamp(scatter_(k, k) / determined / plain, 1 / kMostGain, kMostGain));
+  }
+  ShapeMatrix seen = gain.asDiagonal() * (scatter_ + open) * gain.asDiagonal();
   // Left and right are used alike in the long run.
   for (int a = 0; a < kShapes; ++a)
     for (int b = 0; b <= a; ++b) {
@@ -251,7 +271,7 @@ void NeutralEstimator::findRest() {
     }
     if (largest < 1e-5) break;
   }
-  neutral_.noalias() = mean_ - basis_.matrix() * usual_;
+  neutral_.noalias() = mean_ - basis_matrix_ * usual_;
 }
 
 }  // namespace volto::tracker

@@ -28,8 +28,9 @@ class NeutralEstimator {
   NeutralEstimator(const MeasuredPoints& points, const ShapePrior& shape, const rig::ExpressionTable& table,
                    const ExpressionPrior& expression, const Settings& settings, int capacity);
 
-  // The neutral is known: from now on only the actor's habits are learned.
-  void fixNeutral(const Eigen::VectorXd& deviation, const rig::FeaturePointPositions& neutral_mm);
+  // The neutral is known: from now on only the actor's habits are learned, starting from these.
+  void fixNeutral(const Eigen::VectorXd& deviation, const rig::FeaturePointPositions& neutral_mm, const ShapeVector& usual,
+                  const ShapeMatrix& habits);
 
   // When the store is full every second frame is forgotten. False when it is too early for another one. Allocates nothing.
   bool wants(double time_s) const { return count_ == 0 || time_s - last_time_s_ >= interval_s_; }
@@ -52,6 +53,8 @@ class NeutralEstimator {
     ViewPose pose;
     ShapeVector weights;
     double time_s = 0;
+    int fits = 0;            // since it was stored
+    NormalMatrices normal;  // of an earlier fit
   };
   enum class Stage { begin, frames, solve, finish };
 
@@ -68,6 +71,7 @@ class NeutralEstimator {
   const rig::ExpressionTable* table_;
   const ShapePrior shape_;
   ExpressionBasis basis_;
+  Eigen::MatrixXd basis_matrix_;
   FrameFit fit_;
   ShapeMatrix general_;           // the general statistics' deviation
   Eigen::MatrixXd mean_precision_;  // of M

@@ -6,11 +6,12 @@
 namespace volto::tracker {
 namespace {
 
-// Weights are 0..1, so a speed of 5 per second is a mouth that opens in 0.2 s: with beta 2 its cut-off is 10 Hz above the one at rest.
-constexpr OneEuroConstants kLids{5.0, 4.0};
-constexpr OneEuroConstants kBrows{2.0, 2.0};
-constexpr OneEuroConstants kMouth{4.0, 3.0};
-constexpr OneEuroConstants kElsewhere{2.5, 2.0};  // nose, cheeks
+// Weights are 0..1, so a speed of 5 per second is a mouth that opens in 0.2 s: with beta 8 its cut-off is 40 Hz above the one at rest. The fit
+// itself knows that expressions persist (Settings::expression_memory_s), so these are light.
+constexpr OneEuroConstants kLids{8.0, 8.0};
+constexpr OneEuroConstants kBrows{5.0, 5.0};
+constexpr OneEuroConstants kMouth{8.0, 8.0};
+constexpr OneEuroConstants kElsewhere{5.0, 5.0};  // nose, cheeks
 
 // Residuals are millimetres; detector noise lives here, so they are held stiller than the weights.
 constexpr OneEuroConstants kLidPoints{3.0, 0.2};

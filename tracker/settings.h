@@ -26,8 +26,9 @@ struct Settings {
   double rest_quantile = 0.02;         // the weight that a shape falls to when it rests: this quantile over the take ...
   double rest_deviation = 0.005;       // ... is at zero up to this deviation
   int take_keyframes = 160;            // frames of a take that are looked at
-  int take_passes = 9;
-  int stream_keyframes = 96;           // live: frames kept
+  int take_passes = 40;
+  int stream_keyframes = 80;           // live: frames kept
+  int pieces_per_frame = 2;            // live: stored frames looked at again with each new one
   double stream_interval_s = 0.1;      // live: first spacing between them; doubled whenever the store is full
 };
 

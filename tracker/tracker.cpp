@@ -5,11 +5,11 @@
 #include <cmath>
 #include <optional>
 
-#include "rig/control_mask.h"
 #include "rig/fapu.h"
 #include "tracker/face_model.h"
 #include "tracker/frame_fit.h"
 #include "tracker/head_pose.h"
+#include "tracker/mean_face.h"
 #include "tracker/neutral_estimator.h"
 #include "tracker/neutral_face.h"
 #include "tracker/observability.h"
@@ -49,10 +49,11 @@ struct Tracker::State {
           observer(points, shape.mean(), {state.options.use_3d, state.options.focal_length_px}),
           fit(points, state.settings),
           estimator(points, shape, *state.table, *state.expression, state.settings, state.settings.stream_keyframes),
-          observed(observableShapes(points, *state.table, *state.expression, state.settings)),
+          observed(observableShapes(points, *state.table, false)),
+          observed_with_depth(observableShapes(points, *state.table, true)),
           seen(makeObservation(points.count())) {
       neutral = target = Eigen::VectorXd::Zero(3 * points.count());
-      takeFace(rig::referenceMask());
+      takeFace(meanFace());
       fit.setFace(shape.mean() + neutral, basis);
     }
 
@@ -69,7 +70,8 @@ struct Tracker::State {
     Observer observer;
     FrameFit fit;
     NeutralEstimator estimator;
-    ArkitObserved observed;
+    ArkitObserved observed, observed_with_depth;
+    const ArkitObserved& shows() const { return seen.has_depth ? observed_with_depth : observed; }
     Observation seen;
     Eigen::VectorXd neutral, target;  // deviation from the mean face: in use, and where it is going
     rig::Fapu fapu;
@@ -78,10 +80,9 @@ struct Tracker::State {
 
   void build(LandmarkLayout layout) {
     parts.emplace(*this, layout);
-    if (fixed) fixNeutral(*fixed);
-    general = expression->secondMoment(settings.correlation).llt().solve(ShapeMatrix::Identity());
-    precision = general;
+    precision = expression->secondMoment(settings.correlation).llt().solve(ShapeMatrix::Identity());
     usual.setZero();
+    if (fixed) fixNeutral(*fixed);
     tracking = false;
   }
 
@@ -90,7 +91,18 @@ struct Tracker::State {
     const rig::FeaturePointPositions mm = parts->shape.complete(parts->neutral);
     parts->takeFace(mm);
     parts->fit.setFace(parts->shape.mean() + parts->neutral, parts->basis);
-    parts->estimator.fixNeutral(parts->neutral, mm);
+    ShapeMatrix habits = expression->secondMoment(settings.correlation);
+    usual.setZero();
+    if (std::ranges::any_of(face.deviation, [](float d) { return d > 0; })) {
+      ShapeVector deviation;
+      for (int k = 0; k < kShapes; ++k) {
+        usual[k] = std::clamp(static_cast<double>(face.usual[static_cast<std::size_t>(k)]), 0.0, 1.0);
+        deviation[k] = std::clamp(static_cast<double>(face.deviation[static_cast<std::size_t>(k)]), 0.0, 1.0);
+      }
+      habits = expression->covarianceOf(deviation, settings.correlation);
+    }
+    precision = habits.llt().solve(ShapeMatrix::Identity());
+    parts->estimator.fixNeutral(parts->neutral, mm, usual, habits);
     known = true;
     known_s = kSettle_s;
   }
@@ -110,7 +122,7 @@ struct Tracker::State {
   std::optional<NeutralFace> fixed;
 
   // Expression statistics in use.
-  ShapeMatrix general, precision;
+  ShapeMatrix precision;
   ShapeVector usual;
   bool known = false;    // the neutral rests on this actor's frames
   double known_s = 0;
@@ -167,12 +179,13 @@ bool Tracker::State::track(double dt_s) {
 void Tracker::State::learn(double time_s, double dt_s) {
   Parts& p = *parts;
   if (p.estimator.wants(time_s)) p.estimator.add(p.seen, pose, time_s);
-  if (p.estimator.work()) adoptEstimate();
+  for (int piece = 0; piece < settings.pieces_per_frame; ++piece)
+    if (p.estimator.work()) adoptEstimate();
   if (known && !fixed) known_s += dt_s;
   if (p.target == p.neutral) return;
   p.neutral += (1 - std::exp(-dt_s / kNeutralBlend_s)) * (p.target - p.neutral);
   if ((p.target - p.neutral).cwiseAbs().maxCoeff() < 0.01) p.neutral = p.target;
-  p.fit.moveFace(p.shape.mean() + p.neutral);
+  p.fit.setFace(p.shape.mean() + p.neutral, p.basis);
 }
 
 void Tracker::State::adoptEstimate() {
@@ -205,7 +218,7 @@ void Tracker::State::measure(const LandmarkFrame& in, double dt_s, MaskFrame& ou
     rest_mm.row(feature) = (trust * p.points.trust[i] * rest).transpose();
   }
   for (std::size_t k = 0; k < kArkitBlendshapeCount; ++k)
-    out.arkit_weights[k] = p.observed[k] ? static_cast<float>(weights[static_cast<Eigen::Index>(k)]) : 0.0F;
+    out.arkit_weights[k] = p.shows()[k] ? static_cast<float>(weights[static_cast<Eigen::Index>(k)]) : 0.0F;
   filters.push(dt_s, options.smoothing, out.arkit_weights, rest_mm);
 
   out.state = TrackingState::tracking;
@@ -227,7 +240,7 @@ void Tracker::State::measure(const LandmarkFrame& in, double dt_s, MaskFrame& ou
   translation.tail<2>() = -translation.tail<2>();
   setHeadPose(pose.rotation, translation, out.head);
   out.gaze = {};
-  out.arkit_observed = p.observed;
+  out.arkit_observed = p.shows();
 }
 
 namespace {
@@ -250,7 +263,7 @@ void Tracker::State::lose(double dt_s, MaskFrame& out) {
   back_s = kReturn_s;
   out.confidence = 0;
   out.gaze = {};
-  out.arkit_observed = parts->observed;
+  out.arkit_observed = parts->shows();
   out.point_confidence.fill(0);
   if (!ever_shown || lost_s > options.hold_s + options.ease_s) {
     out.state = TrackingState::no_face;

@@ -19,6 +19,9 @@ class ExpressionPrior;  // tracker/expression_prior.h
 struct NeutralFace {
   rig::FeaturePointPositions positions_mm;
   std::array<float, kFeaturePointCount> confidence{};  // 1 measured, towards 0 as inferred
+  // How this actor uses the 52 shapes, as far as a take has shown it: usual weight, and deviation from it. All zero: not known.
+  ArkitWeights usual{};
+  ArkitWeights deviation{};
 };
 
 struct TrackerOptions {
