@@ -9,6 +9,7 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <poll.h>
 #include <random>
 #include <set>
 #include <sys/eventfd.h>
@@ -291,32 +292,34 @@ struct Publisher::State {
   void run() {
     std::int64_t next_status = monotonicNs();
     while (true) {
+      // Frames first, all else after them. Reading comes last, so that the descriptors tell of anything new: see
+      // Socket::fd.
+      if (!sendQueue()) {
+        sendStatus(true);
+        return;
+      }
       const std::int64_t now = monotonicNs();
       if (now >= next_status) {
         sendStatus(false);
         next_status = now + kStatusPeriodNs;
       }
       const std::int64_t next_character = sendDueCharacters();
-      const std::int64_t wait_ns = std::min(next_status, next_character) - monotonicNs();
-      waitForWork(static_cast<long>(std::clamp<std::int64_t>(wait_ns / kMs + 1, 0, 500)));
-      readSubscriptions();
       readMonitor();
       answerAccess();
-      answerRequests();
-      if (!sendQueue()) {
-        sendStatus(true);
-        return;
-      }
+      const bool all_answered = answerRequests();
+      const bool all_read = readSubscriptions() && all_answered;
+      const std::int64_t wait_ns = all_read ? std::min(next_status, next_character) - monotonicNs() : 0;
+      waitForWork(static_cast<int>(std::clamp<std::int64_t>((wait_ns + kMs - 1) / kMs, 0, 500)));
     }
   }
 
-  void waitForWork(long timeout_ms) {
-    std::array<zmq_pollitem_t, 5> items{{{nullptr, wake_fd, ZMQ_POLLIN, 0},
-                                         {frames.get(), 0, ZMQ_POLLIN, 0},
-                                         {snapshots.get(), 0, ZMQ_POLLIN, 0},
-                                         {monitor.get(), 0, ZMQ_POLLIN, 0},
-                                         {zap.get(), 0, ZMQ_POLLIN, 0}}};
-    zmq_poll(items.data(), keys ? 5 : 4, timeout_ms);
+  void waitForWork(int timeout_ms) {
+    std::array<pollfd, 5> items{{{wake_fd, POLLIN, 0},
+                                 {frames.fd(), POLLIN, 0},
+                                 {snapshots.fd(), POLLIN, 0},
+                                 {monitor.fd(), POLLIN, 0},
+                                 {zap.fd(), POLLIN, 0}}};
+    ::poll(items.data(), items.size(), timeout_ms);  // a descriptor of -1 is passed over
     std::uint64_t count = 0;
     [[maybe_unused]] const ssize_t got = ::read(wake_fd, &count, sizeof(count));
   }
@@ -445,10 +448,16 @@ struct Publisher::State {
     }
   }
 
-  void readSubscriptions() {
+  // False when there is more.
+  bool readSubscriptions() {
     Message message;
     bool changed = false;
-    for (int i = 0; i < 1000 && message.receive(frames); ++i) {
+    bool all_read = false;
+    for (int i = 0; i < 1000; ++i) {
+      if (!message.receive(frames)) {
+        all_read = true;
+        break;
+      }
       const std::string_view text = message.text();
       if (text.empty() || text.size() > static_cast<std::size_t>(kMaxHandshakeBytes) || (text[0] != 0 && text[0] != 1))
         continue;
@@ -469,10 +478,14 @@ struct Publisher::State {
       }
       changed = true;
     }
-    if (!changed) return;
+    if (!changed) return all_read;
     const std::lock_guard guard(mutex);
-    for (CharacterSlot& slot : characters) slot.wants_mesh = wantsTopic(slot.mesh->topic);
+    for (CharacterSlot& slot : characters) {
+      slot.wants_mesh = wantsTopic(slot.mesh->topic);
+      all_read = all_read && !slot.due;  // a late joiner is served before we sleep
+    }
     subscribed.notify_all();
+    return all_read;
   }
 
   void readMonitor() {
@@ -519,10 +532,11 @@ struct Publisher::State {
   }
 
   // "character/" or "character/NAME/" comes in, pairs of topic and payload go out.
-  void answerRequests() {
-    for (int i = 0; i < 32; ++i) {
+  // False when there is more.
+  bool answerRequests() {
+    for (int i = 0; i < 1000; ++i) {
       Message peer;
-      if (!peer.receive(snapshots)) return;
+      if (!peer.receive(snapshots)) return true;
       std::vector<std::string> parts;
       Message part;
       bool more = peer.more();
@@ -540,6 +554,7 @@ struct Publisher::State {
       }
       answer(peer, delimiter, parts[0]);
     }
+    return false;
   }
 
   bool withinRate(const std::string& peer) {

@@ -52,6 +52,13 @@ std::string Socket::lastEndpoint() const {
   return text.data();
 }
 
+int Socket::fd() const {
+  int fd = -1;
+  std::size_t size = sizeof(fd);
+  if (socket_ != nullptr) zmq_getsockopt(socket_, ZMQ_FD, &fd, &size);
+  return fd;
+}
+
 Message::Message(std::string_view content) {
   if (zmq_msg_init_size(&message_, content.size()) != 0) throw std::bad_alloc();
   std::memcpy(zmq_msg_data(&message_), content.data(), content.size());

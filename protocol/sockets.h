@@ -46,6 +46,9 @@ class Socket {
   void set(int option, std::int64_t value);
   void set(int option, std::string_view value);
   std::string lastEndpoint() const;
+  // For poll(2). It tells of changes only: read the socket until nothing is left (and send nothing in between) before
+  // waiting on it.
+  int fd() const;
 
  private:
   void* socket_ = nullptr;
@@ -56,8 +59,11 @@ class Message {
   Message() { zmq_msg_init(&message_); }
   explicit Message(std::string_view content);
   ~Message() { zmq_msg_close(&message_); }
-  Message(const Message&) = delete;
-  Message& operator=(const Message&) = delete;
+  Message(Message&& other) noexcept : Message() { zmq_msg_move(&message_, &other.message_); }
+  Message& operator=(Message&& other) noexcept {
+    zmq_msg_move(&message_, &other.message_);
+    return *this;
+  }
   zmq_msg_t* get() { return &message_; }
   std::size_t size() const { return zmq_msg_size(&message_); }
   const char* data() { return static_cast<const char*>(zmq_msg_data(&message_)); }

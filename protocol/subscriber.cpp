@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstring>
 #include <deque>
 #include <map>
 #include <optional>
+#include <poll.h>
 
 #include "protocol/clock.h"
 #include "protocol/sockets.h"
@@ -21,22 +23,26 @@ constexpr std::int64_t kReconnectMinNs = 100 * kMs, kReconnectMaxNs = 2000 * kMs
 
 bool isSlow(MessageKind kind) { return kind == MessageKind::character || kind == MessageKind::status; }
 
-// A message in memory of our own, aligned, used again and again.
+// A message at an aligned address: where ZeroMQ put it, or copied if that address is odd (small messages; large ones
+// lie well).
 struct Held {
   std::string topic;
-  std::vector<std::uint64_t> words;
-  std::size_t size = 0;
+  Message message;
+  std::vector<std::uint64_t> copy;
+  Bytes payload;
   MessageKind kind = MessageKind::status;
   Stamp stamp;
   std::uint64_t lost_before = 0;
   bool new_epoch = false;
   std::int64_t t_receive_ns = 0;
 
-  Bytes payload() const { return {reinterpret_cast<const std::byte*>(words.data()), size}; }
-  void assign(std::string_view bytes) {
-    size = bytes.size();
-    words.resize((size + 7) / 8);
-    if (size > 0) std::memcpy(words.data(), bytes.data(), size);
+  void assign(Message&& received) {
+    message = std::move(received);
+    payload = Bytes(reinterpret_cast<const std::byte*>(message.data()), message.size());
+    if (reinterpret_cast<std::uintptr_t>(payload.data()) % alignof(std::uint64_t) == 0) return;
+    copy.resize((payload.size() + 7) / 8);
+    std::memcpy(copy.data(), payload.data(), payload.size());
+    payload = Bytes(reinterpret_cast<const std::byte*>(copy.data()), payload.size());
   }
 };
 
@@ -149,13 +155,15 @@ struct Subscriber::State {
       const std::int64_t now = monotonicNs();
       if (now >= deadline) return false;
       // Awake at least ten times a second, to make a lost connection anew.
-      const auto wait_ms = static_cast<long>(std::min<std::int64_t>((deadline - now) / kMs + 1, 100));
-      std::array<zmq_pollitem_t, 2> items{};
-      int used = 0;
-      for (Connection& c : connections) {
-        if (c.socket.get() != nullptr) items[static_cast<std::size_t>(used++)] = {c.socket.get(), 0, ZMQ_POLLIN, 0};
+      const auto wait_ms = static_cast<int>(std::min<std::int64_t>((deadline - now) / kMs + 1, 100));
+      // All sockets have just been read until nothing was left, so their descriptors tell of anything new. zmq_poll
+      // would ask twice.
+      std::array<pollfd, 2> waiting_for{};
+      nfds_t used = 0;
+      for (const Connection& c : connections) {
+        if (c.socket.get() != nullptr) waiting_for[used++] = {c.socket.fd(), POLLIN, 0};
       }
-      if (zmq_poll(items.data(), used, wait_ms) < 0 && zmq_errno() == EINTR) return false;
+      if (::poll(waiting_for.data(), used, wait_ms) < 0 && errno == EINTR) return false;
     }
   }
 
@@ -214,7 +222,7 @@ struct Subscriber::State {
       reject(std::to_string(parts) + " frames instead of topic and payload");
       return true;
     }
-    admit(topic.text(), payload.text());
+    admit(topic.text(), std::move(payload));
     return true;
   }
 
@@ -223,12 +231,12 @@ struct Subscriber::State {
     last_problem = std::move(problem);
   }
 
-  void admit(std::string_view topic_text, std::string_view bytes) {
+  void admit(std::string_view topic_text, Message&& payload) {
     const std::optional<Topic> topic = parseTopic(topic_text);
     if (!topic) return reject("unknown topic");
-    held.assign(bytes);
-    if (Result r = inspector.check(held.payload(), held.stamp); !r.ok()) return reject(r.problem);
-    if (messageKind(held.payload()) != topic->kind) return reject("the message is not of its topic's kind");
+    held.assign(std::move(payload));
+    if (Result r = inspector.check(held.payload, held.stamp); !r.ok()) return reject(r.problem);
+    if (messageKind(held.payload) != topic->kind) return reject("the message is not of its topic's kind");
     held.topic.assign(topic_text);
     held.kind = topic->kind;
     held.t_receive_ns = monotonicNs();
@@ -288,7 +296,7 @@ struct Subscriber::State {
     out.topic = held.topic;
     out.kind = held.kind;
     out.name = parseTopic(held.topic)->name;
-    out.payload = held.payload();
+    out.payload = held.payload;
     out.stamp = held.stamp;
     out.lost_before = held.lost_before;
     out.new_epoch = held.new_epoch;

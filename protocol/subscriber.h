@@ -51,7 +51,7 @@ struct ReceivedMessage {
   std::string_view topic;
   MessageKind kind = MessageKind::status;
   std::string_view name;  // of the topic
-  Bytes payload;          // 16-byte aligned, has passed checkMessage: decode(payload, ...) succeeds
+  Bytes payload;          // 8-byte aligned, has passed checkMessage: decode(payload, ...) succeeds
   Stamp stamp;
   std::uint64_t lost_before = 0;  // messages of this topic lost just before this one
   bool new_epoch = false;         // the publisher started anew: reset filters, forget characters
