@@ -31,7 +31,7 @@ struct WeightSolverOptions {
 
   // Affects speed. A weight may be off by about this much, and the most rounds of descent before the answer is taken as
   // it is.
-  double tolerance = 1e-5;
+  double tolerance = 3e-5;
   int max_rounds = 50;
 };
 
@@ -81,8 +81,9 @@ class WeightSolver {
   void buildRightSide(const MeshMaskDisplacement& displacement);
   void computeGradient();
   void minimise();
-  double sweep();
+  double sweep(std::size_t& changes_of_bound);
   bool newtonStep();
+  double objective() const;
   void shift(std::size_t k, double by);  // w_k += by, gradient follows
 
   std::vector<Shape> shapes_;
@@ -96,9 +97,10 @@ class WeightSolver {
   std::size_t stride_;                                         // of gram_, doubles
   std::vector<double> gram_;                                   // n by stride: B' C B, without the pulls
   std::vector<double> pull_, prior_;                           // n
+  std::vector<double> per_curvature_;                          // n: 1 / (diagonal of the Gram matrix + pull)
   std::vector<Role> role_;
   std::vector<double> right_side_, gradient_, w_;
-  std::vector<double> cholesky_, step_;
+  std::vector<double> cholesky_, step_, start_;
   std::vector<std::uint32_t> free_;
   int last_rounds_ = 0;
 };
