@@ -15,7 +15,7 @@ struct Known {
   Surface surface;
 };
 
-const Vec3 kSkin{0.58F, 0.33F, 0.235F};
+const Vec3 kSkin{0.57F, 0.315F, 0.22F};
 
 const std::array<Known, 28>& knownSurfaces() {
   static const std::array<Known, 28> known{{
@@ -24,7 +24,7 @@ const std::array<Known, 28>& knownSurfaces() {
       {"occlusion", {"occlusion", {0.1F, 0.08F, 0.08F}, 0.0F, 8.0F, 0.0F, false}},
       {"cornea", {"cornea", {0.9F, 0.9F, 0.9F}, 0.05F, 300.0F, 0.0F, false}},
       {"lash", {"eyelashes", {0.022F, 0.016F, 0.013F}, 0.02F, 30.0F}},
-      {"brow", {"eyebrows", {0.085F, 0.045F, 0.027F}, 0.02F, 20.0F, 0.3F}},
+      {"brow", {"eyebrows", {0.06F, 0.03F, 0.018F}, 0.02F, 20.0F, 0.3F}},
       {"eyelid", {"skin", kSkin, 0.028F, 22.0F, 1.0F}},
       {"iris", {"iris", {0.10F, 0.17F, 0.22F}, 0.05F, 220.0F}},
       {"pupil", {"pupil", {0.004F, 0.004F, 0.004F}, 0.05F, 260.0F}},
@@ -34,12 +34,12 @@ const std::array<Known, 28>& knownSurfaces() {
       {"eyeball", {"eye_white", {0.74F, 0.71F, 0.69F}, 0.05F, 220.0F, 0.3F}},
       {"socket", {"socket", {0.30F, 0.13F, 0.10F}, 0.03F, 30.0F, 0.6F}},
       {"caruncle", {"caruncle", {0.55F, 0.22F, 0.19F}, 0.05F, 120.0F, 1.0F}},
-      {"teeth", {"teeth", {0.72F, 0.66F, 0.55F}, 0.05F, 120.0F, 0.4F}},
-      {"tooth", {"teeth", {0.72F, 0.66F, 0.55F}, 0.05F, 120.0F, 0.4F}},
-      {"gum", {"gums", {0.45F, 0.14F, 0.13F}, 0.05F, 90.0F, 0.8F}},
+      {"teeth", {"teeth", {0.80F, 0.72F, 0.60F}, 0.03F, 36.0F, 0.7F}},
+      {"tooth", {"teeth", {0.80F, 0.72F, 0.60F}, 0.03F, 36.0F, 0.7F}},
+      {"gum", {"gums", {0.34F, 0.10F, 0.09F}, 0.04F, 60.0F, 0.7F}},
       {"tongue", {"tongue", {0.47F, 0.15F, 0.14F}, 0.05F, 70.0F, 0.9F}},
       {"lip", {"lips", {0.49F, 0.165F, 0.135F}, 0.038F, 42.0F, 1.0F}},
-      {"mouth", {"mouth", {0.20F, 0.05F, 0.045F}, 0.03F, 40.0F, 0.6F}},
+      {"mouth", {"mouth", {0.13F, 0.032F, 0.03F}, 0.03F, 40.0F, 0.5F}},
       {"hair", {"hair", {0.07F, 0.04F, 0.025F}, 0.03F, 40.0F, 0.0F}},
       {"cloth", {"cloth", {0.05F, 0.06F, 0.08F}, 0.02F, 10.0F, 0.0F}},
       {"shirt", {"cloth", {0.05F, 0.06F, 0.08F}, 0.02F, 10.0F, 0.0F}},

@@ -42,7 +42,7 @@ float smooth(float from, float to, float x) {
 
 LightSet lightSet(Lighting lighting) {
   static const std::array<Light, 4> studio{{
-      {unit(-0.55F, 0.62F, 0.72F), Vec3{1.0F, 0.955F, 0.89F} * 1.75F},
+      {unit(-0.55F, 0.62F, 0.72F), Vec3{1.0F, 0.955F, 0.89F} * 1.62F},
       {unit(0.85F, 0.10F, 0.62F), Vec3{0.80F, 0.90F, 1.0F} * 0.42F},
       {unit(0.75F, 0.35F, -0.62F), Vec3{0.78F, 0.88F, 1.0F} * 1.25F},
       {unit(-0.85F, 0.25F, -0.55F), Vec3{0.95F, 0.92F, 1.0F} * 0.55F},
