@@ -1,0 +1,118 @@
+// The shipped head driven by the expression table through Volto's own rigging.
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "rig/build_rig.h"
+#include "rig/mesh_io.h"
+#include "tests/support/test_data.h"
+
+namespace volto::rig {
+namespace {
+
+class HeadRig : public ::testing::Test {
+ protected:
+  static const Rig& rig() {
+    static const Rig made = [] {
+      const auto folder = test::sourceDir() / "rig/assets";
+      std::ifstream file(folder / "volto_head.points.json");
+      const std::string json{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+      return buildRig(readMesh(folder / "volto_head.obj"), parseFeaturePoints(json, "volto_head.points.json"));
+    }();
+    return made;
+  }
+  // Where a vertex is with these shapes at full weight.
+  static Eigen::Vector3d moved(std::size_t v, std::initializer_list<std::string_view> shapes) {
+    Eigen::Vector3d p = rig().neutral.positions.row(static_cast<Eigen::Index>(v)).transpose();
+    for (const Blendshape& shape : rig().blendshapes) {
+      if (std::find(shapes.begin(), shapes.end(), shape.name) == shapes.end()) continue;
+      const DeformationOperator& op = rig().deformation;
+      for (std::size_t k = op.row_start[v]; k < op.row_start[v + 1]; ++k)
+        for (int axis = 0; axis < 3; ++axis)
+          p[axis] += static_cast<double>(op.weight[k]) *
+                     static_cast<double>(shape.mask_displacement[op.point[k]][static_cast<std::size_t>(axis)]);
+    }
+    return p;
+  }
+  static std::size_t vertexOf(std::string_view id) {
+    return static_cast<std::size_t>(rig().feature_vertex[featurePointIndex(id).value()]);
+  }
+};
+
+TEST_F(HeadRig, NeedsNoSubstituteForAnyFapu) { EXPECT_TRUE(rig().fapu.substitutions.empty()); }
+
+TEST_F(HeadRig, FindsEyeballsTeethAndTongue) {
+  int left_eye = 0, right_eye = 0, jaw = 0, fixed = 0, skin = 0;
+  for (const RigidPart& part : rig().rigid_parts) {
+    left_eye += part.follows == RigidPart::Follows::left_eye;
+    right_eye += part.follows == RigidPart::Follows::right_eye;
+    jaw += part.follows == RigidPart::Follows::jaw;
+    fixed += part.follows == RigidPart::Follows::head;
+    skin += part.follows == RigidPart::Follows::skin;
+  }
+  EXPECT_EQ(left_eye, 1);
+  EXPECT_EQ(right_eye, 1);
+  EXPECT_EQ(jaw, 2);    // lower teeth, tongue
+  EXPECT_EQ(fixed, 1);  // upper teeth
+  EXPECT_EQ(skin, 4);   // lashes, brows
+}
+
+TEST_F(HeadRig, BlinkClosesTheLidsOverTheEyeball) {
+  const auto blink = {std::string_view("eyeBlinkLeft")};
+  const double open = moved(vertexOf("3.1"), {}).y() - moved(vertexOf("3.3"), {}).y();
+  const double closed = moved(vertexOf("3.1"), blink).y() - moved(vertexOf("3.3"), blink).y();
+  EXPECT_LT(std::fabs(closed), 0.08 * open);
+  // The eyeball does not show: the skin over it (not the rim of the lids, which faces it) stays outside.
+  const Mesh& mesh = rig().neutral;
+  const RigidPart* eye = nullptr;
+  for (const RigidPart& part : rig().rigid_parts)
+    if (part.follows == RigidPart::Follows::left_eye) eye = &part;
+  ASSERT_NE(eye, nullptr);
+  const Eigen::Vector3d centre(eye->centre[0], eye->centre[1], eye->centre[2]);
+  const double radius = (moved(eye->vertices.front(), {}) - centre).norm();
+  double deepest = 0;
+  int over_the_eye = 0;
+  for (std::size_t p = 0; p < mesh.polygonCount(); ++p) {
+    if (mesh.materials[mesh.polygon_material[p]].name != "skin") continue;
+    for (std::uint32_t c = mesh.polygon_start[p]; c < mesh.polygon_start[p + 1]; ++c) {
+      const Eigen::Vector3d at = moved(mesh.corner_vertices[c], blink) - centre;
+      if (at.head<2>().norm() > 0.8 * radius || at.z() < 0) continue;
+      ++over_the_eye;
+      deepest = std::max(deepest, radius - at.norm());
+    }
+  }
+  EXPECT_GT(over_the_eye, 100);
+  EXPECT_LT(deepest, 0.005 * rig().fapu.fapu.eye_separation);
+}
+
+TEST_F(HeadRig, JawOpenPartsTheLipsAndTakesTheLowerTeethAlong) {
+  const auto open = {std::string_view("jawOpen")};
+  const double gap = moved(vertexOf("2.2"), open).y() - moved(vertexOf("2.3"), open).y();
+  EXPECT_GT(gap, 0.5 * rig().fapu.fapu.mouth_nose);
+  for (const RigidPart& part : rig().rigid_parts) {
+    const std::size_t v = part.vertices.front();
+    const double down = moved(v, {}).y() - moved(v, open).y();
+    if (part.follows == RigidPart::Follows::jaw) {
+      EXPECT_GT(down, 0.3 * gap) << part.name;
+    } else {
+      EXPECT_NEAR(down, 0, 0.05) << part.name;
+    }
+  }
+}
+
+TEST_F(HeadRig, NeckBorderAndBackOfTheHeadStayWhereTheyAre) {
+  const Mesh& mesh = rig().neutral;
+  for (const Blendshape& shape : rig().blendshapes)
+    for (std::size_t v = 0; v < mesh.vertexCount(); v += 7) {
+      const auto at = mesh.positions.row(static_cast<Eigen::Index>(v));
+      if (at[1] > -17 && at[2] > -7) continue;
+      EXPECT_LT((moved(v, {shape.name}) - moved(v, {})).norm(), 1e-6) << shape.name << " moves vertex " << v;
+    }
+}
+
+}  // namespace
+}  // namespace volto::rig

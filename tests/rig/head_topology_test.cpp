@@ -1,0 +1,127 @@
+// The head as a surface: closed where it should be, oriented, symmetric, without degenerate faces.
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "rig/assets/head/head_mesh.h"
+
+namespace volto::head {
+namespace {
+
+class HeadTopology : public ::testing::Test {
+ protected:
+  static const Head& head() {
+    static const Head made = makeHead();
+    return made;
+  }
+  static const Vec3& at(int v) { return head().vertices[static_cast<std::size_t>(v)]; }
+  static std::map<std::pair<int, int>, int> directedEdges() {
+    std::map<std::pair<int, int>, int> edges;
+    for (const Polygon& polygon : head().polygons)
+      for (std::size_t i = 0; i < polygon.corners.size(); ++i)
+        ++edges[{polygon.corners[i], polygon.corners[(i + 1) % polygon.corners.size()]}];
+    return edges;
+  }
+};
+
+TEST_F(HeadTopology, IsAnOrientedManifold) {
+  for (const auto& [edge, count] : directedEdges()) ASSERT_EQ(count, 1) << edge.first << " -> " << edge.second;
+}
+
+TEST_F(HeadTopology, IsOpenAtTheNeckAndBehindTheLidsOnly) {
+  const auto edges = directedEdges();
+  std::map<int, int> next;  // along the border
+  for (const auto& [edge, count] : edges)
+    if (!edges.contains({edge.second, edge.first})) {
+      ASSERT_FALSE(next.contains(edge.first)) << "two borders meet at vertex " << edge.first;
+      next[edge.first] = edge.second;
+    }
+  int neck = 0, left_lids = 0, right_lids = 0, other = 0;
+  while (!next.empty()) {
+    const int start = next.begin()->first;
+    Vec3 sum;
+    int length = 0;
+    for (int v = start; next.contains(v); ++length) {
+      sum = sum + at(v);
+      const int following = next[v];
+      next.erase(v);
+      v = following;
+    }
+    const Vec3 middle = sum * (1.0 / length);
+    if (middle.y < -15 && std::fabs(middle.x) < 1e-9)
+      ++neck;
+    else if (std::fabs(middle.y) < 1 && middle.x > 2 && middle.x < 4)
+      ++left_lids;
+    else if (std::fabs(middle.y) < 1 && middle.x < -2 && middle.x > -4)
+      ++right_lids;
+    else
+      ++other;
+  }
+  EXPECT_EQ(neck, 1);
+  EXPECT_EQ(left_lids, 1);
+  EXPECT_EQ(right_lids, 1);
+  EXPECT_EQ(other, 0);
+}
+
+TEST_F(HeadTopology, LeftAndRightMirrorExactly) {
+  for (std::size_t v = 0; v < head().vertices.size(); ++v) {
+    const int m = head().mirror[v];
+    ASSERT_EQ(head().mirror[static_cast<std::size_t>(m)], static_cast<int>(v));
+    const Vec3 &a = head().vertices[v], &b = at(m);
+    ASSERT_EQ(a.x, -b.x);
+    ASSERT_EQ(a.y, b.y);
+    ASSERT_EQ(a.z, b.z);
+  }
+  std::set<std::vector<int>> polygons;
+  const auto canonical = [](std::vector<int> corners) {
+    std::rotate(corners.begin(), std::min_element(corners.begin(), corners.end()), corners.end());
+    return corners;
+  };
+  for (const Polygon& polygon : head().polygons) polygons.insert(canonical(polygon.corners));
+  ASSERT_EQ(polygons.size(), head().polygons.size());
+  for (const Polygon& polygon : head().polygons) {
+    std::vector<int> mirrored;
+    for (auto c = polygon.corners.rbegin(); c != polygon.corners.rend(); ++c)
+      mirrored.push_back(head().mirror[static_cast<std::size_t>(*c)]);
+    ASSERT_TRUE(polygons.contains(canonical(mirrored)));
+  }
+}
+
+TEST_F(HeadTopology, NoTriangleIsDegenerate) {
+  double smallest = 1;
+  for (const Polygon& polygon : head().polygons)
+    for (std::size_t i = 1; i + 1 < polygon.corners.size(); ++i) {
+      const Vec3 a = at(polygon.corners[0]), b = at(polygon.corners[i]), c = at(polygon.corners[i + 1]);
+      smallest = std::min(smallest, 0.5 * length(cross(b - a, c - a)));
+    }
+  EXPECT_GT(smallest, 5e-6);  // square centimetres; five decimals are written
+}
+
+TEST_F(HeadTopology, FacesLookOutOfEveryComponent) {
+  std::vector<double> volume(head().components.size(), 0);
+  for (std::size_t p = 0; p < head().polygons.size(); ++p) {
+    const auto& corners = head().polygons[p].corners;
+    for (std::size_t i = 1; i + 1 < corners.size(); ++i)
+      volume[static_cast<std::size_t>(head().polygon_component[p])] +=
+          dot(at(corners[0]), cross(at(corners[i]), at(corners[i + 1]))) / 6;
+  }
+  for (std::size_t c = 0; c < volume.size(); ++c) EXPECT_GT(volume[c], 0) << head().components[c].name;
+  EXPECT_NEAR(volume[0], 3500, 700);  // the skin: cubic centimetres of a head with its neck
+}
+
+TEST_F(HeadTopology, IsMadeOfQuadsAndOfAReasonableSize) {
+  std::size_t quads = 0;
+  for (const Polygon& polygon : head().polygons) quads += polygon.corners.size() == 4 ? 1 : 0;
+  EXPECT_GT(static_cast<double>(quads), 0.98 * static_cast<double>(head().polygons.size()));
+  EXPECT_GE(head().vertices.size(), 8000U);
+  EXPECT_LE(head().vertices.size(), 20000U);
+  std::set<int> used;
+  for (const Polygon& polygon : head().polygons) used.insert(polygon.corners.begin(), polygon.corners.end());
+  EXPECT_EQ(used.size(), head().vertices.size()) << "a vertex belongs to no polygon";
+}
+
+}  // namespace
+}  // namespace volto::head
