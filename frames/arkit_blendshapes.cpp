@@ -34,12 +34,20 @@ std::optional<std::size_t> arkitBlendshapeIndex(std::string_view name) {
 }
 
 std::size_t arkitMirrorIndex(std::size_t index) {
-  std::string name(kArkitBlendshapeNames.at(index));
-  if (name.ends_with("Left"))
-    name.replace(name.size() - 4, 4, "Right");
-  else if (name.ends_with("Right"))
-    name.replace(name.size() - 5, 5, "Left");
-  return arkitBlendshapeIndex(name).value_or(index);
+  // Looked up once: this is asked in per-frame loops, where a search and a string per call would be felt.
+  static const auto kMirror = [] {
+    std::array<std::size_t, kArkitBlendshapeCount> mirror{};
+    for (std::size_t i = 0; i < mirror.size(); ++i) {
+      std::string name(kArkitBlendshapeNames[i]);
+      if (name.ends_with("Left"))
+        name.replace(name.size() - 4, 4, "Right");
+      else if (name.ends_with("Right"))
+        name.replace(name.size() - 5, 5, "Left");
+      mirror[i] = arkitBlendshapeIndex(name).value_or(i);
+    }
+    return mirror;
+  }();
+  return kMirror.at(index);
 }
 
 }  // namespace volto
