@@ -1,8 +1,8 @@
 #include "tools/cli/bake_picture.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -30,13 +30,6 @@ picture::ViewOptions viewNamed(const std::string& name, int size_px, const rig::
   return view;
 }
 
-// How much is going on in a face: what makes one moment worth showing rather than another.
-float liveliness(const AvatarFrame& avatar) {
-  float sum = 0;
-  for (const float weight : avatar.weights) sum += weight * weight;
-  return sum;
-}
-
 }  // namespace
 
 std::string frameFileName(std::size_t number, const char* extension) {
@@ -48,7 +41,7 @@ std::string frameFileName(std::size_t number, const char* extension) {
 struct PictureBaker::State {
   struct Moment {
     std::int64_t t_ns = 0;
-    float liveliness = -1;
+    float liveliness = std::numeric_limits<float>::lowest();
     HeadPose head;
     std::vector<std::array<float, 3>> vertices;
   };
@@ -60,6 +53,18 @@ struct PictureBaker::State {
         moments(std::min(expected, kSheetColumns * kSheetRows)) {
     options.sheet = options.sheet || options.path.extension() == ".png";
     view = viewNamed(options.view, options.sheet ? kTile_px : kFrame_px, rig);
+    for (const rig::Blendshape& shape : rig.blendshapes) {
+      const auto index = arkitBlendshapeIndex(shape.name);
+      const std::string_view name = index ? kArkitBlendshapeNames[*index] : std::string_view(shape.name);
+      value.push_back(name.starts_with("eyeBlink") ? -4.0F : name.starts_with("eye") ? 0.0F : 1.0F);
+    }
+  }
+
+  // What makes one moment worth showing rather than another: much going on in the face, and open eyes.
+  float liveliness(const AvatarFrame& avatar) const {
+    float sum = 0;
+    for (std::size_t i = 0; i < value.size(); ++i) sum += value[i] * avatar.weights[i] * avatar.weights[i];
+    return sum;
   }
 
   picture::Picture render(const HeadPose& head, std::span<const std::array<float, 3>> vertices) {
@@ -70,6 +75,7 @@ struct PictureBaker::State {
   PictureOptions options;
   picture::HeadRenderer renderer;
   picture::ViewOptions view;
+  std::vector<float> value;  // of each blendshape, for liveliness
   std::size_t expected;
   std::size_t seen = 0;
   std::vector<Moment> moments;  // of a sheet: the liveliest frame of each stretch of the performance
@@ -94,7 +100,7 @@ void PictureBaker::frame(std::size_t number, std::int64_t t_ns, const AvatarFram
   }
   State::Moment& moment = s.moments[std::min(s.moments.size() - 1, s.seen * s.moments.size() / s.expected)];
   ++s.seen;
-  const float lively = liveliness(avatar);
+  const float lively = s.liveliness(avatar);
   if (lively <= moment.liveliness) return;
   moment = {t_ns, lively, avatar.head, avatar.vertices};
 }

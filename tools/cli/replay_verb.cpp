@@ -33,6 +33,7 @@ struct Options {
   bool loop = false;
   bool stats = false;
   bool no_mesh = false;
+  bool lossless = false;
   TrackingFlags tracking;
 };
 
@@ -84,7 +85,7 @@ int run(const Options& options) {
   protocol::PublisherOptions publisher_options;
   publisher_options.endpoint = options.endpoint;
   publisher_options.source = protocol::topicNameFrom(performance.source);
-  publisher_options.when_full = protocol::WhenFull::wait;
+  publisher_options.when_full = options.lossless ? protocol::WhenFull::lossless : protocol::WhenFull::wait;
   protocol::Publisher publisher(publisher_options);
   publisher.setCharacter(pipeline::characterOf(rig, !options.no_mesh));
 
@@ -117,6 +118,9 @@ RunVerb defineReplay(CLI::App& app) {
       ->type_name("X|max");
   app.add_flag("--loop", options->loop, "from the start again, until stopped");
   app.add_flag("--no-mesh", options->no_mesh, "weights only: neither compute nor publish the deformed mesh");
+  app.add_flag(
+      "--lossless", options->lossless,
+      "wait up to a second for a slow subscriber rather than let it lose frames: for recording, not for keeping time");
   app.add_option("--wait", options->wait_s, "wait at most so long for a first subscriber (default 0: do not wait)")
       ->type_name("SECONDS")
       ->check(CLI::Range(0.0, 86400.0));
