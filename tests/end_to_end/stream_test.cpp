@@ -37,7 +37,7 @@ class Stream : public World {
 
 TEST_F(Stream, EveryFrameOfAReplayReachesAListenerInAnotherProcess) {
   Process listener(listen({"--count", "90", "--json"}));
-  Process player(replay(performance(90), {"--wait", "20"}));
+  Process player(replay(performance(90), {"--wait", "20", "--lossless"}));
   const Finished played = player.wait(), listened = listener.wait();
   ASSERT_EQ(played.status, 0) << played.err;
   EXPECT_EQ(played.out.rfind("90 frames in ", 0), 0U) << played.out;
