@@ -78,9 +78,10 @@ struct OpenFaceCsvReader::State {
       const auto number = pointNumber(rows.columns()[i], prefix);
       if (!number) continue;
       if (*number >= kPoints) {
-        rows.fail("column '" + rows.columns()[i] + "' is one point too many; 68 points, 0 to 67, are expected");
+        rows.fail("column " + shown(rows.columns()[i]) + " is one point too many; 68 points, 0 to 67, are expected");
       }
-      if (out[*number] != kAbsent) rows.fail("column '" + rows.columns()[i] + "' is there twice; keep one of them");
+      if (out[*number] != kAbsent)
+        rows.fail("column " + shown(rows.columns()[i]) + " is there twice; keep one of them");
       out[*number] = i;
       ++found;
     }
