@@ -227,7 +227,7 @@ Vec3 browLine(double t) {
   // Quadratic through the inner end, the peak and the outer end.
   const double x = lerp(1.05, 5.15, t);
   const double past = (t - 0.64) / 0.36;
-  const double y = t < 0.64 ? lerp(2.00, 2.46, std::sin(t / 0.64 * kPi / 2)) : 2.46 - 0.66 * past * past;
+  const double y = t < 0.64 ? lerp(2.05, 2.46, std::sin(t / 0.64 * kPi / 2)) : 2.46 - 0.66 * past * past;
   return castToSkin({x, y, 16}, {0, 0, -1});
 }
 

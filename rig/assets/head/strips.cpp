@@ -74,9 +74,9 @@ Vec3 eyePoint(double ring, double around) {
 constexpr double kMouthGap = 0.005;  // half of the hair's gap between the closed lips
 // 11 knots from the middle of the upper lip over the corner to the middle of the lower lip.
 constexpr double kBorderX[11] = {0.0, 0.50, 1.08, 1.66, 2.16, 2.50, 2.13, 1.62, 1.07, 0.53, 0.0};
-constexpr double kBorderY[11] = {-5.90, -5.76, -5.93, -6.18, -6.42, -6.61, -6.93, -7.25, -7.46, -7.56, -7.58};
+constexpr double kBorderY[11] = {-5.90, -5.76, -5.93, -6.18, -6.40, -6.57, -6.92, -7.25, -7.46, -7.56, -7.58};
 constexpr double kRimX[11] = {0.0, 0.48, 1.0, 1.52, 1.98, 2.32, 1.98, 1.52, 1.0, 0.48, 0.0};
-constexpr double kRimY[11] = {-6.67, -6.63, -6.60, -6.61, -6.63, -6.62, -6.63, -6.61, -6.60, -6.63, -6.67};
+constexpr double kRimY[11] = {-6.67, -6.63, -6.60, -6.61, -6.62, -6.59, -6.62, -6.61, -6.60, -6.63, -6.67};
 constexpr double kRimBack[11] = {0.20, 0.21, 0.22, 0.22, 0.18, 0.12, 0.18, 0.22, 0.22, 0.20, 0.20};
 constexpr double kFullness[11] = {0.42, 0.4, 0.35, 0.25, 0.12, 0.0, 0.13, 0.29, 0.42, 0.47, 0.49};
 
@@ -129,7 +129,10 @@ Vec3 earPoint(double ring, double around) {
   const Vec3 back = back0 * ct - up0 * st, up = up0 * ct + back0 * st;
   const Vec3 origin{6.35, -1.65, 0.45};
   const double oa = wrappedSpline(kOutlineA, around), ob = wrappedSpline(kOutlineB, around);
-  const auto at = [&](double a, double b, double h) { return origin + back * a + up * b + out * h; };
+  // The lobe leans in to the head.
+  const auto at = [&](double a, double b, double h) {
+    return origin + back * a + up * b + out * (h - 0.38 * smoothstep(-0.8, -2.8, b));
+  };
 
   // How much of a free edge there is: none in front, where the ear grows out of the cheek.
   const double phase = 2 * kPi * around / kEarAround;
