@@ -5,10 +5,13 @@
 
 #include <Eigen/Geometry>
 
+#include "rig/closest_point.h"
+
 namespace volto::rig {
 namespace {
 
 constexpr double kRayLimitEs = 0.4;
+constexpr double kNearEs = 0.03;
 
 struct MaskFace {
   Eigen::Vector3d a, ab, ac, normal;
@@ -77,6 +80,28 @@ class Associator {
     return found;
   }
 
+  // Where the normal just misses the mask (at its outline, at the margins of lids and lips) but the mask is there all
+  // the same: the nearest point of it, under the same conditions.
+  bool byNearness(std::uint32_t v) {
+    const Eigen::Vector3d p = mesh_.positions.row(v), n = skin_.normals.row(v);
+    double best = kNearEs * es_;
+    bool found = false;
+    for (std::size_t t = 0; t < faces_.size(); ++t) {
+      const MaskFace& face = faces_[t];
+      if (n.dot(face.normal) <= 0) continue;
+      const SurfacePoint nearest = closestPointOnTriangle(p, face.a, face.a + face.ab, face.a + face.ac);
+      const Hit hit{nearest.distance, nearest.barycentric};
+      if (nearest.distance >= best || onOtherSide(v, face.side) || !nearAlongSkin(v, face, hit)) continue;
+      best = nearest.distance;
+      found = true;
+      out_.triangle[v] = static_cast<std::int16_t>(t);
+      out_.barycentric[v] = nearest.barycentric;
+      out_.side[v] = face.side;
+    }
+    if (found) out_.kind[v] = AssociationKind::geodesic;
+    return found;
+  }
+
   // The triangle at the feature point with the shortest path; of those, the one whose other points are nearest.
   void byPath(std::uint32_t v, const RegionsOfInfluence& regions) {
     Eigen::Index nearest = 0;
@@ -106,14 +131,14 @@ class Associator {
       if (of_point == side) own = std::min(own, out_.point_distance(v, static_cast<Eigen::Index>(p)));
       if (opposite(of_point, side)) other = std::min(other, out_.point_distance(v, static_cast<Eigen::Index>(p)));
     }
-    return other < own;
+    return other < 0.6F * own;  // beside a corner both are about as near, and either will do
   }
 
   bool nearAlongSkin(std::uint32_t v, const MaskFace& face, const Hit& hit) const {
     const Eigen::Vector3d q = face.a + hit.barycentric[1] * face.ab + hit.barycentric[2] * face.ac;
     for (const std::uint8_t p : face.points) {
       const double air = (points_.row(p).transpose() - q).norm();
-      if (out_.point_distance(v, p) > 1.7 * air + 2.0 * hit.distance + 0.05 * es_) return false;
+      if (out_.point_distance(v, p) > 2.2 * air + 2.0 * hit.distance + 0.08 * es_) return false;
     }
     return true;
   }
@@ -135,6 +160,7 @@ SkinAssociation associateSkin(const Mesh& mesh, const Skin& skin, const std::vec
   SkinAssociation out;
   out.triangle.assign(vertices, -1);
   out.kind.assign(vertices, AssociationKind::outside);
+  out.on_mask.assign(vertices, false);
   out.barycentric.assign(vertices, {0, 0, 0});
   out.side.assign(vertices, SlitSide::none);
   out.beyond.assign(vertices, kUnreached);
@@ -158,7 +184,8 @@ SkinAssociation associateSkin(const Mesh& mesh, const Skin& skin, const std::vec
   std::vector<std::uint32_t> left;
   for (std::uint32_t v = 0; v < vertices; ++v) {
     if (!skin.stands(v) || !is_skin[skin.component[v]]) continue;
-    if (associator.byRay(v))
+    out.on_mask[v] = associator.byRay(v) || associator.byNearness(v);
+    if (out.on_mask[v])
       covered.push_back({v, 0.0F});
     else
       left.push_back(v);
@@ -166,7 +193,7 @@ SkinAssociation associateSkin(const Mesh& mesh, const Skin& skin, const std::vec
   // The feature points themselves always count as covered, whatever their normals do.
   for (const SkinPoint& point : on_skin)
     for (const GeodesicSource& s : point.around)
-      if (out.kind[s.vertex] != AssociationKind::ray) covered.push_back(s);
+      if (!out.on_mask[s.vertex]) covered.push_back(s);
   out.beyond = geodesicDistances(skin.graph, covered, static_cast<float>(fade_out)).distance;
   const RegionsOfInfluence regions = regionsOfInfluence();
   for (const std::uint32_t v : left)

@@ -21,10 +21,11 @@ using SkinPoints = std::array<SkinPoint, kFeaturePointCount>;
 struct SkinAssociation {
   std::vector<std::int16_t> triangle;  // #V, -1: none
   std::vector<AssociationKind> kind;   // #V; outside for all that is not skin
+  std::vector<bool> on_mask;           // #V: associated by its ray, or so close to the mask that it needs none
   std::vector<std::array<double, 3>>
       barycentric;             // #V: where in its triangle; the nearest feature point for `geodesic`
   std::vector<SlitSide> side;  // #V: which lip or lid the vertex is on
-  std::vector<float> beyond;   // #V: geodesic distance to the nearest vertex that a ray associated; 0 there
+  std::vector<float> beyond;   // #V: geodesic distance to the nearest vertex on the mask; 0 there
   Eigen::Matrix<float, Eigen::Dynamic, static_cast<int>(kFeaturePointCount), Eigen::RowMajor>
       point_distance;  // geodesic; kUnreached when far
 };

@@ -219,31 +219,36 @@ class PartPlacer {
     return part.high[2] < lips + 0.02 * mouth_width_;
   }
 
-  // Weights that carry the affine motion which the jaw's points have in the least-squares sense.
+  // Weights that carry the affine motion which the jaw's points have in the least-squares sense. Skin follows the bone
+  // under it only in part, the less the farther back: on the ICT head the chin nearly all the way, the jaw line and the
+  // corner of the jaw as said here.
   OperatorRow jawRow(const Eigen::Vector3d& at) const {
-    static constexpr std::array<std::pair<std::string_view, double>, 8> kJaw = {{{"2.1", 1.0},
-                                                                                 {"2.10", 1.0},
-                                                                                 {"2.11", 1.0},
-                                                                                 {"2.12", 1.0},
-                                                                                 {"12.17", 0.7},
-                                                                                 {"12.18", 0.7},
-                                                                                 {"2.13", 0.4},
-                                                                                 {"2.14", 0.4}}};
+    struct JawPoint {
+      std::string_view id;
+      double trust, follows_bone;
+    };
+    static constexpr std::array<JawPoint, 8> kJaw = {{{"2.1", 1.0, 1.0},
+                                                      {"2.10", 1.0, 1.0},
+                                                      {"2.11", 1.0, 1.0},
+                                                      {"2.12", 1.0, 1.0},
+                                                      {"12.17", 0.7, 0.85},
+                                                      {"12.18", 0.7, 0.85},
+                                                      {"2.13", 0.4, 0.42},
+                                                      {"2.14", 0.4, 0.42}}};
     Eigen::Matrix<double, 4, 4> normal = Eigen::Matrix4d::Zero();
     Eigen::Matrix<double, 4, 8> columns;
     for (std::size_t i = 0; i < kJaw.size(); ++i) {
       Eigen::Vector4d b;
-      b << 1.0, point(kJaw[i].first) - mouth_;
-      normal += kJaw[i].second * b * b.transpose();
-      columns.col(static_cast<Eigen::Index>(i)) = kJaw[i].second * b;
+      b << 1.0, point(kJaw[i].id) - mouth_;
+      normal += kJaw[i].trust * b * b.transpose();
+      columns.col(static_cast<Eigen::Index>(i)) = kJaw[i].trust / kJaw[i].follows_bone * b;
     }
     normal.diagonal().tail<3>().array() += 0.01;  // points in one plane say nothing of what happens away from it
     Eigen::Vector4d b;
     b << 1.0, at - mouth_;
     const Eigen::Matrix<double, 1, 8> weights = normal.ldlt().solve(b).transpose() * columns;
     OperatorRow row{};
-    for (std::size_t i = 0; i < kJaw.size(); ++i)
-      row[pointIndex(kJaw[i].first)] = weights[static_cast<Eigen::Index>(i)];
+    for (std::size_t i = 0; i < kJaw.size(); ++i) row[pointIndex(kJaw[i].id)] = weights[static_cast<Eigen::Index>(i)];
     return row;
   }
 

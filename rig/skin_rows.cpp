@@ -198,7 +198,7 @@ SkinRows skinRows(const Mesh& mesh, const Skin& skin, const SkinAssociation& ass
   const std::array<double, kFeaturePointCount> edge_length = maskEdgeLength(points);
   std::vector<double> data_weight(mesh.vertexCount(), 0.0);
   for (std::uint32_t v = 0; v < mesh.vertexCount(); ++v) {
-    if (out.row_of_vertex[v] < 0 || association.kind[v] != AssociationKind::ray) continue;
+    if (out.row_of_vertex[v] < 0 || !association.on_mask[v]) continue;
     const auto triangle = static_cast<std::size_t>(association.triangle[v]);
     const auto& barycentric = association.barycentric[v];
     out.rows[static_cast<std::size_t>(out.row_of_vertex[v])] =

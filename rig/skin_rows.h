@@ -21,7 +21,7 @@ struct SkinRows {
   }
 };
 
-// 1. Each vertex that a ray associated takes the RBFs of the triangles around its triangle's points, weighted so that
+// 1. Each vertex on the mask takes the RBFs of the triangles around its triangle's points, weighted so that
 // the weights
 //    change continuously from triangle to triangle and only RBFs that hold a feature point have a say at that point.
 // 2. The rows x of all vertices minimise the squared Laplacian of x over the skin, plus the squared distance to the
