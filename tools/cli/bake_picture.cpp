@@ -10,6 +10,7 @@
 #include "tools/picture/contact_sheet.h"
 #include "tools/picture/head_renderer.h"
 #include "tools/picture/png.h"
+#include "tools/picture/rig_look.h"
 
 namespace volto::cli {
 
@@ -48,7 +49,7 @@ struct PictureBaker::State {
 
   State(PictureOptions o, const rig::Rig& rig, std::size_t frames)
       : options(std::move(o)),
-        renderer(rig.neutral),
+        renderer(rig.neutral, picture::lookOfRig(rig)),
         expected(std::max<std::size_t>(frames, 1)),
         moments(std::min(expected, kSheetColumns * kSheetRows)) {
     options.sheet = options.sheet || options.path.extension() == ".png";
