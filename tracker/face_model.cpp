@@ -86,6 +86,7 @@ ShapePrior::ShapePrior(const MeasuredPoints& points, const Settings& settings) :
   // Take out of every deviation the similarity transform that the measured points would see in it: pose has that.
   const Eigen::MatrixXd directions = similarityDirections(face);
   const Eigen::MatrixXd seen = rowsOf(directions, points);
+  size_ = seen.col(6);
   const Eigen::MatrixXd normal = seen.transpose() * seen;
   const Eigen::MatrixXd pick = normal.ldlt().solve(seen.transpose());  // 7 by 3P
   Eigen::MatrixXd all = smoothCovariance(face, settings);

@@ -33,12 +33,14 @@ class ShapePrior {
   const Eigen::MatrixXd& covariance() const { return covariance_; }  // 3P by 3P; no rigid motion and no change of size in it
   const Eigen::MatrixXd& precision() const { return precision_; }    // its inverse; a rigid motion or a change of size costs next to nothing
 
+  const Eigen::VectorXd& size() const { return size_; }              // 3P: what growing by 100 % adds, about the centre
+
   // All 84 points from a deviation of the measured ones from the mean: measured ones exactly, the others as their neighbours say.
   rig::FeaturePointPositions complete(const Eigen::VectorXd& deviation) const;
 
  private:
   MeasuredPoints points_;
-  Eigen::VectorXd mean_;
+  Eigen::VectorXd mean_, size_;
   Eigen::MatrixXd covariance_, precision_;
   Eigen::MatrixXd fill_;  // 252 by 3P
 };

@@ -35,6 +35,7 @@ NeutralEstimator::NeutralEstimator(const MeasuredPoints& points, const ShapePrio
   // M's prior: a person's shape and a usual expression of twice the general size.
   const ShapeVector usual = 2 * expression.secondMoment(0).diagonal();
   Eigen::MatrixXd covariance = shape.covariance() + b * usual.asDiagonal() * b.transpose();
+  covariance += (settings.shape_size * settings.shape_size) * shape.size() * shape.size().transpose();
   covariance.diagonal().array() += 1e-4;
   mean_precision_ = covariance.llt().solve(Eigen::MatrixXd::Identity(size, size));
   rest_pull_ = b.transpose() * shape.precision();

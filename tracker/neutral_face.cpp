@@ -17,7 +17,7 @@ NeutralFace makeNeutralFace(const ShapePrior& shape, const MeasuredPoints& point
 }
 
 // S. Umeyama: Least-squares estimation of transformation parameters between two point patterns, PAMI 1991.
-Eigen::VectorXd deviationOf(const NeutralFace& face, const ShapePrior& shape, const MeasuredPoints& points) {
+Deviation deviationOf(const NeutralFace& face, const ShapePrior& shape, const MeasuredPoints& points) {
   if (!face.positions_mm.allFinite())
     throw std::invalid_argument("the neutral face has a position that is not a number; measure it again");
   Eigen::Matrix3Xd given(3, points.count()), mean(3, points.count());
@@ -36,10 +36,11 @@ Eigen::VectorXd deviationOf(const NeutralFace& face, const ShapePrior& shape, co
   if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) sign.z() = -1;
   const Eigen::Matrix3d rotation = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
   const double scale = svd.singularValues().dot(sign) / spread;
+  if (!(scale > 1e-6 && scale < 1e6)) throw std::invalid_argument("the neutral face does not look like a face; measure it again");
   Eigen::VectorXd deviation(3 * points.count());
   for (int p = 0; p < points.count(); ++p)
     deviation.segment<3>(3 * p) = scale * rotation * given.col(p) - mean.col(p);
-  return deviation;
+  return {deviation, 1 / scale};
 }
 
 }  // namespace volto::tracker

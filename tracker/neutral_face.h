@@ -12,8 +12,13 @@ namespace volto::tracker {
 
 NeutralFace makeNeutralFace(const ShapePrior& shape, const MeasuredPoints& points, const Eigen::VectorXd& deviation, double scale);
 
-// The face turned, moved and scaled onto the mean face, less the mean face (3P). Throws std::invalid_argument (Tracker::setNeutral).
-Eigen::VectorXd deviationOf(const NeutralFace& face, const ShapePrior& shape, const MeasuredPoints& points);
+// The face turned, moved and scaled onto the mean face, less the mean face (3P), and its size relative to the mean face. Throws
+// std::invalid_argument (Tracker::setNeutral).
+struct Deviation {
+  Eigen::VectorXd points;
+  double scale;
+};
+Deviation deviationOf(const NeutralFace& face, const ShapePrior& shape, const MeasuredPoints& points);
 
 // With settings and statistics of one's own, for measuring them.
 NeutralFace neutralFromTake(std::span<const LandmarkFrame> take, const TrackerOptions& options, const rig::ExpressionTable& table,

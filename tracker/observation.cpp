@@ -12,7 +12,7 @@ namespace {
 constexpr double kGuessedFocalLength = 1.0;
 constexpr double kLargestPixel = 1e5;
 constexpr double kLeastConfidence = 0.05;
-constexpr int kScaleFrames = 200;
+constexpr double kOtherSize = 0.15;  // a face this much larger or smaller than expected is not the one that was measured
 
 // The smallest usual image that holds all points; for landmark files that do not say.
 std::array<double, 2> guessImageSize(const LandmarkFrame& frame) {
@@ -50,6 +50,12 @@ void Observer::chooseCamera(const LandmarkFrame& frame) {
   if (!(focal_px_ > 0 && std::isfinite(focal_px_))) focal_px_ = kGuessedFocalLength * std::max(size[0], size[1]);
   focal_px_ = std::max(focal_px_, 1.0);
   camera_known_ = true;
+}
+
+void Observer::expectScale(double scale) {
+  scale_ = scale;
+  scale_known_ = true;
+  scale_checked_ = false;
 }
 
 bool Observer::read(const LandmarkFrame& frame, Observation& out) {
@@ -101,7 +107,7 @@ bool Observer::read3d(const LandmarkFrame& frame, Observation& out) {
   if (good_points * 4 < points_.count() * 3) return false;
   centre /= good_points;
   model_centre /= good_points;
-  if (scale_frames_ < kScaleFrames) {
+  if (!scale_checked_) {
     double spread = 0, model_spread = 0;
     for (int p = 0; p < points_.count(); ++p) {
       if (out.weight[p] <= 0) continue;
@@ -110,8 +116,9 @@ bool Observer::read3d(const LandmarkFrame& frame, Observation& out) {
     }
     const double ratio = std::sqrt(spread / model_spread);
     if (!(ratio > 1e-3 && ratio < 1e3)) return false;
-    ++scale_frames_;
-    scale_ += (ratio - scale_) / scale_frames_;
+    // One size for the whole stream: what an expression adds to the first frame's, the neutral's estimate takes out again.
+    if (!scale_known_ || std::abs(ratio / scale_ - 1) > kOtherSize) scale_ = ratio;
+    scale_checked_ = true;
   }
   out.point /= scale_;
   return true;

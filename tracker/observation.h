@@ -22,6 +22,8 @@ class Observer {
 
   // Size of this face relative to the mean face: 1 for 2D input, where size and distance cannot be told apart.
   double scale() const { return scale_; }
+  // The size is known, from the actor's neutral. 3D input that is far from it overrules it.
+  void expectScale(double scale);
   double focalLength_px() const { return focal_px_; }
 
  private:
@@ -35,7 +37,7 @@ class Observer {
   bool camera_known_ = false;
   double focal_px_ = 0, centre_x_px_ = 0, centre_y_px_ = 0;
   double scale_ = 1;
-  int scale_frames_ = 0;
+  bool scale_known_ = false, scale_checked_ = false;
 };
 
 // Observations with room for that many points.

@@ -6,11 +6,11 @@
 namespace volto::tracker {
 namespace {
 
-// Weights are 0..1, so a speed of 5 per second is a mouth that opens in 0.2 s: with beta 8 its cut-off is 40 Hz above the one at rest. The fit
+// Weights are 0..1, so a speed of 5 per second is a mouth that opens in 0.2 s: with beta 15 its cut-off is 75 Hz above the one at rest. The fit
 // itself knows that expressions persist (Settings::expression_memory_s), so these are light.
-constexpr OneEuroConstants kLids{8.0, 8.0};
+constexpr OneEuroConstants kLids{12.0, 15.0};
 constexpr OneEuroConstants kBrows{5.0, 5.0};
-constexpr OneEuroConstants kMouth{8.0, 8.0};
+constexpr OneEuroConstants kMouth{12.0, 15.0};
 constexpr OneEuroConstants kElsewhere{5.0, 5.0};  // nose, cheeks
 
 // Residuals are millimetres; detector noise lives here, so they are held stiller than the weights.

@@ -14,6 +14,7 @@ struct Settings {
   double shape_reach_mm = 15.0;        // over what distance neighbours differ together
   double shape_point_mm = 0.4;         // how far each point differs on its own
   double shape_asymmetry = 0.05;       // share of the variance that is not mirror symmetric
+  double shape_size = 0.03;            // 3D: how far the size, taken from one frame, may be off, as a share
 
   // --- Expression
   double correlation = 0.5;            // how much of the measured correlation between shapes is believed
@@ -28,7 +29,9 @@ struct Settings {
   int take_keyframes = 160;            // frames of a take that are looked at
   int take_passes = 40;
   int stream_keyframes = 80;           // live: frames kept
-  int pieces_per_frame = 2;            // live: stored frames looked at again with each new one
+  int early_passes = 12;               // live: until the store has been gone through so often ...
+  int early_pieces_per_frame = 3;      // ... so many stored frames are looked at again with each new one,
+  int pieces_per_frame = 1;            // then so many
   double stream_interval_s = 0.1;      // live: first spacing between them; doubled whenever the store is full
 };
 

@@ -87,19 +87,21 @@ struct Tracker::State {
   }
 
   void fixNeutral(const NeutralFace& face) {
-    parts->neutral = parts->target = deviationOf(face, parts->shape, parts->points);
+    const Deviation deviation = deviationOf(face, parts->shape, parts->points);
+    parts->neutral = parts->target = deviation.points;
+    parts->observer.expectScale(deviation.scale);
     const rig::FeaturePointPositions mm = parts->shape.complete(parts->neutral);
     parts->takeFace(mm);
     parts->fit.setFace(parts->shape.mean() + parts->neutral, parts->basis);
     ShapeMatrix habits = expression->secondMoment(settings.correlation);
     usual.setZero();
     if (std::ranges::any_of(face.deviation, [](float d) { return d > 0; })) {
-      ShapeVector deviation;
+      ShapeVector spread;
       for (int k = 0; k < kShapes; ++k) {
         usual[k] = std::clamp(static_cast<double>(face.usual[static_cast<std::size_t>(k)]), 0.0, 1.0);
-        deviation[k] = std::clamp(static_cast<double>(face.deviation[static_cast<std::size_t>(k)]), 0.0, 1.0);
+        spread[k] = std::clamp(static_cast<double>(face.deviation[static_cast<std::size_t>(k)]), 0.0, 1.0);
       }
-      habits = expression->covarianceOf(deviation, settings.correlation);
+      habits = expression->covarianceOf(spread, settings.correlation);
     }
     precision = habits.llt().solve(ShapeMatrix::Identity());
     parts->estimator.fixNeutral(parts->neutral, mm, usual, habits);
@@ -179,7 +181,8 @@ bool Tracker::State::track(double dt_s) {
 void Tracker::State::learn(double time_s, double dt_s) {
   Parts& p = *parts;
   if (p.estimator.wants(time_s)) p.estimator.add(p.seen, pose, time_s);
-  for (int piece = 0; piece < settings.pieces_per_frame; ++piece)
+  const int pieces = p.estimator.passes() < settings.early_passes ? settings.early_pieces_per_frame : settings.pieces_per_frame;
+  for (int piece = 0; piece < pieces; ++piece)
     if (p.estimator.work()) adoptEstimate();
   if (known && !fixed) known_s += dt_s;
   if (p.target == p.neutral) return;
