@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <stdexcept>
 #include <string_view>
 
@@ -24,7 +25,8 @@ constexpr std::array<HumanProportion, 4> kHumanProportions = {{
 }};
 constexpr double kNearZero = 0.02;  // of the human proportion: below it a unit cannot carry a displacement
 
-double& unitOf(Fapu& fapu, FapuUnit unit) {
+template <typename AnyFapu>  // Fapu or const Fapu
+auto& unitOf(AnyFapu& fapu, FapuUnit unit) {
   switch (unit) {
     case FapuUnit::iris_diameter:
       return fapu.iris_diameter;
@@ -48,7 +50,7 @@ std::string number(double value) {
 
 }  // namespace
 
-double Fapu::operator[](FapuUnit unit) const { return unitOf(const_cast<Fapu&>(*this), unit); }
+double Fapu::operator[](FapuUnit unit) const { return unitOf(*this, unit); }
 
 FapuMeasurement measureFapu(const FeaturePointPositions& neutral) {
   if (!neutral.allFinite()) throw std::invalid_argument("a feature point is not a finite position");
