@@ -265,13 +265,14 @@ Rendered HeadRenderer::State::render(std::span<const Vec3> points, const ViewOpt
       std::array<std::uint32_t, 16> seen;
       std::array<Vec3, 16> colour;
       std::size_t kinds = 0;
+      int empty = 0;
       Vec3 sum{};
       for (int j = 0; j < samples; ++j) {
         for (int i = 0; i < samples; ++i) {
           const std::uint32_t triangle =
               visible.triangle[first + static_cast<std::size_t>(j) * stride + static_cast<std::size_t>(i)];
           if (triangle == kNoTriangle) {
-            sum = sum + backgroundAt(x, y);
+            ++empty;
             continue;
           }
           std::size_t k = 0;
@@ -284,6 +285,7 @@ Rendered HeadRenderer::State::render(std::span<const Vec3> points, const ViewOpt
           sum = sum + colour[k];
         }
       }
+      if (empty > 0) sum = sum + backgroundAt(x, y) * static_cast<float>(empty);
       sum = sum * (per_sample * per_sample);
       out.picture.rgb[3 * pixel] = srgb(sum.x);
       out.picture.rgb[3 * pixel + 1] = srgb(sum.y);
