@@ -254,12 +254,14 @@ class PartPlacer {
 
   void placeMouth() {
     std::vector<std::size_t> inside;
-    double low = mouth_[1], high = mouth_[1];
+    double low = mouth_[1], high = mouth_[1], left = mouth_[0], right = mouth_[0];
     for (std::size_t c = 0; c < components_.size(); ++c)
       if (!done_[c] && inMouth(components_[c])) {
         inside.push_back(c);
         low = std::min(low, components_[c].low[1]);
         high = std::max(high, components_[c].high[1]);
+        left = std::min(left, components_[c].low[0]);
+        right = std::max(right, components_[c].high[0]);
       }
     if (inside.empty()) return;
     // Where upper and lower teeth meet: near the slit of the lips, and near the middle of all that is in there.
@@ -272,18 +274,20 @@ class PartPlacer {
     for (const std::size_t c : inside) {
       const Component& part = components_[c];
       done_[c] = true;
-      const bool both = part.low[1] < split - 0.12 * mouth_width_ && part.high[1] > split + 0.12 * mouth_width_ &&
-                        part.high[1] - part.low[1] > 0.6 * (high - low) && !part.named({"tongue", "upper", "lower"});
+      const Eigen::Vector3d size = part.high - part.low;
+      // A tongue lies along the middle, deeper than wide and narrower than the teeth; it can reach above the lower
+      // ones.
+      const bool tongue = part.named({"tongue"}) ||
+                          (std::abs(part.centre[0] - mouth_[0]) < 0.1 * mouth_width_ && part.vertices.size() > 30 &&
+                           size[2] > std::max(1.2 * size[0], 0.5 * mouth_width_) && size[0] < 0.7 * (right - left) &&
+                           part.centre[1] < split + 0.1 * mouth_width_);
+      const bool both = !tongue && part.low[1] < split - 0.12 * mouth_width_ &&
+                        part.high[1] > split + 0.12 * mouth_width_ && part.high[1] - part.low[1] > 0.6 * (high - low) &&
+                        !part.named({"upper", "lower"});
       if (both) {
         joined.push_back(c);
         continue;
       }
-      const Eigen::Vector3d size = part.high - part.low;
-      // A tongue lies along the middle, deeper than wide; it can reach above the lower teeth.
-      const bool tongue =
-          part.named({"tongue"}) || (std::abs(part.centre[0] - mouth_[0]) < 0.1 * mouth_width_ &&
-                                     size[2] > std::max(1.2 * size[0], 0.5 * mouth_width_) &&
-                                     part.vertices.size() > 30 && part.centre[1] < split + 0.1 * mouth_width_);
       const bool lower = tongue || part.named({"lower"}) || (!part.named({"upper"}) && part.centre[1] < split);
       auto& teeth = lower ? lower_teeth : upper_teeth;
       teeth.insert(teeth.end(), part.vertices.begin(), part.vertices.end());
