@@ -335,7 +335,7 @@ TEST_F(PublishTest, SubscriberThatDoesNotReadSlowsNobodyDown) {
     ASSERT_TRUE(publisher.waitForSubscriber(MessageKind::weights, 3000));
     const AvatarFrame frame = sampleAvatar(1, 5000);
     std::atomic<bool> done = false;
-    std::uint64_t got = 0;
+    std::atomic<std::uint64_t> got = 0;
     std::thread reader([&] {
       ReceivedMessage message;
       while (!done) got += reading.receive(message, 20) ? 1 : 0;
@@ -371,11 +371,14 @@ TEST_F(PublishTest, LiveTheNewestFrameWinsAndDropsAreCounted) {
   constexpr std::uint64_t kFrames = 20'000;
   const LandmarkFrame frame = sampleLandmarks();
   for (std::uint64_t n = 1; n < kFrames; ++n) publisher.push(frame);
+  publisher.flush();
+  // Let the pipe to the subscriber, which holds four messages, run empty.
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
   publisher.push(sampleLandmarks(kFrames));
   publisher.flush();
   ReceivedMessage message;
   std::uint64_t last = 0, got = 0;
-  while (subscriber.receive(message, 200)) {
+  while (last != kFrames && subscriber.receive(message, 1000)) {
     last = message.stamp.capture_seq;
     ++got;
   }
