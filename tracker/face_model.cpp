@@ -108,9 +108,10 @@ ShapePrior::ShapePrior(const MeasuredPoints& points, const Settings& settings) :
 
 rig::FeaturePointPositions ShapePrior::complete(const Eigen::VectorXd& deviation) const {
   rig::FeaturePointPositions face = meanFace();
-  Eigen::Map<Eigen::VectorXd>(face.data(), kAll) += fill_ * deviation;
+  Eigen::Map<Eigen::VectorXd>(face.data(), kAll).noalias() += fill_ * deviation;
   for (int p = 0; p < points_.count(); ++p)
-    face.row(points_.feature[static_cast<std::size_t>(p)]) = (mean_ + deviation).segment<3>(3 * p).transpose();
+    face.row(points_.feature[static_cast<std::size_t>(p)]) =
+        (mean_.segment<3>(3 * p) + deviation.segment<3>(3 * p)).transpose();
   return face;
 }
 

@@ -10,6 +10,7 @@ namespace volto::tracker {
 namespace {
 
 constexpr double kNearestDepth = 20.0;  // mm: no camera is nearer to a point of a face
+constexpr double kMostCounted = 3.0;    // one point far astray says no more about the fit than this many outlier limits
 constexpr int kSmallestFace = 6;        // points
 
 Eigen::Matrix<double, 3, 6> motionJacobian(const Eigen::Vector3d& p) {
@@ -84,7 +85,8 @@ bool FrameFit::evaluate(const Observation& seen, const ViewPose& pose, const Sha
       for (std::size_t c = 0; c < 3; ++c)
         view_[row][c][p] = static_cast<float>(a(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(c)));
     residual_.segment<3>(3 * p) = seen.weight[p] > 0 ? pull : Eigen::Vector3d::Zero();
-    sum += cut * norm * norm;
+    const double counted = std::min(norm, kMostCounted * outlier_mm_);
+    sum += cut * counted * counted;
     weight_sum += cut;
     if (norm > outlier_mm_) cut *= outlier_mm_ / norm;
     pull *= cut * points_.trust[p];
@@ -94,7 +96,7 @@ bool FrameFit::evaluate(const Observation& seen, const ViewPose& pose, const Sha
     pose_gradient_.tail<3>() += pull;
   }
   rms_mm_ = weight_sum > 0 ? std::sqrt(sum / weight_sum) : 0;
-  return std::isfinite(sum);
+  return std::isfinite(sum) && pose_gradient_.allFinite();
 }
 
 void FrameFit::composeNormalMatrices(const Observation& seen) {

@@ -123,7 +123,8 @@ void NeutralEstimator::beginPass() {
   prior_.precision = habits_.llt().solve(ShapeMatrix::Identity());
   prior_.low = fixed_ ? 0 : -1;
   prior_.mean = fixed_ ? usual_ : ShapeVector::Zero();
-  fit_.setFace(shape_.mean() + mean_, basis_);
+  product_ = shape_.mean() + mean_;
+  fit_.setFace(product_, basis_);
   pull_.setZero();
   block_.setZero();
   sum_.setZero();

@@ -54,13 +54,18 @@ struct Tracker::State {
           seen(makeObservation(points.count())) {
       neutral = target = Eigen::VectorXd::Zero(3 * points.count());
       takeFace(meanFace());
-      fit.setFace(shape.mean() + neutral, basis);
+      faceChanged();
     }
 
     void takeFace(const rig::FeaturePointPositions& face_mm) {
       fapu = rig::measureFapu(face_mm).fapu;
       scale_mm = rig::fapuScale(fapu);
       basis.fitTo(face_mm);
+    }
+
+    void faceChanged() {
+      face = shape.mean() + neutral;
+      fit.setFace(face, basis);
     }
 
     LandmarkLayout layout;
@@ -73,6 +78,7 @@ struct Tracker::State {
     ArkitObserved observed, observed_with_depth;
     const ArkitObserved& shows() const { return seen.has_depth ? observed_with_depth : observed; }
     Observation seen;
+    Eigen::VectorXd face;
     Eigen::VectorXd neutral, target;  // deviation from the mean face: in use, and where it is going
     rig::Fapu fapu;
     rig::FeaturePointPositions scale_mm;
@@ -92,7 +98,7 @@ struct Tracker::State {
     parts->observer.expectScale(deviation.scale);
     const rig::FeaturePointPositions mm = parts->shape.complete(parts->neutral);
     parts->takeFace(mm);
-    parts->fit.setFace(parts->shape.mean() + parts->neutral, parts->basis);
+    parts->faceChanged();
     ShapeMatrix habits = expression->secondMoment(settings.correlation);
     usual.setZero();
     if (std::ranges::any_of(face.deviation, [](float d) { return d > 0; })) {
@@ -188,7 +194,7 @@ void Tracker::State::learn(double time_s, double dt_s) {
   if (p.target == p.neutral) return;
   p.neutral += (1 - std::exp(-dt_s / kNeutralBlend_s)) * (p.target - p.neutral);
   if ((p.target - p.neutral).cwiseAbs().maxCoeff() < 0.01) p.neutral = p.target;
-  p.fit.setFace(p.shape.mean() + p.neutral, p.basis);
+  p.faceChanged();
 }
 
 void Tracker::State::adoptEstimate() {
@@ -205,7 +211,7 @@ void Tracker::State::adoptEstimate() {
       differs(fapu.eye_nose, p.fapu.eye_nose) || differs(fapu.mouth_nose, p.fapu.mouth_nose) ||
       differs(fapu.mouth_width, p.fapu.mouth_width))
     p.takeFace(face);
-  p.fit.setFace(p.shape.mean() + p.neutral, p.basis);
+  p.faceChanged();
 }
 
 void Tracker::State::measure(const LandmarkFrame& in, double dt_s, MaskFrame& out) {
@@ -320,12 +326,13 @@ void Tracker::push(const LandmarkFrame& in, MaskFrame& out) {
   out.t_capture_ns = in.t_capture_ns;
   out.capture_seq = in.capture_seq;
 
-  double dt_s = 1.0 / 60;
+  double passed_s = 1.0 / 60;
   bool usable = true;
   if (s.started) {
     usable = in.t_capture_ns > s.last_ns;
-    dt_s = std::clamp(static_cast<double>(in.t_capture_ns - s.last_ns) * 1e-9, kSmallestStep_s, kLargestStep_s);
+    passed_s = usable ? 1e-9 * (static_cast<double>(in.t_capture_ns) - static_cast<double>(s.last_ns)) : 0;
   }
+  const double dt_s = std::clamp(passed_s, kSmallestStep_s, kLargestStep_s);
   if (usable) s.last_ns = in.t_capture_ns;
   s.started = true;
 
@@ -347,7 +354,7 @@ void Tracker::push(const LandmarkFrame& in, MaskFrame& out) {
     s.last_good = out;
     s.ever_shown = true;
   } else {
-    s.lose(dt_s, out);
+    s.lose(passed_s, out);
   }
   s.shown = out;
 }
