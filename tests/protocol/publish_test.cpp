@@ -366,7 +366,7 @@ TEST_F(PublishTest, SubscriberThatDoesNotReadSlowsNobodyDown) {
 
 TEST_F(PublishTest, LiveTheNewestFrameWinsAndDropsAreCounted) {
   Publisher publisher(publisherAt("a", WhenFull::newest_wins));
-  Subscriber subscriber(subscriberTo(publisher, {"landmarks/"}));
+  Subscriber subscriber(subscriberTo(publisher, {"landmarks/"}, 30'000));
   ASSERT_TRUE(publisher.waitForSubscriber(MessageKind::landmarks, 3000));
   constexpr std::uint64_t kFrames = 20'000;
   const LandmarkFrame frame = sampleLandmarks();
