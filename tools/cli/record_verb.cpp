@@ -151,8 +151,7 @@ int run(const Options& options) {
   }
   std::printf("%llu messages recorded to %s; %llu lost on the way, %llu dropped while writing\n",
               static_cast<unsigned long long>(written.committed), options.output.c_str(),
-              static_cast<unsigned long long>(counters.lost),
-              static_cast<unsigned long long>(written.dropped));
+              static_cast<unsigned long long>(counters.lost), static_cast<unsigned long long>(written.dropped));
   return kDone;
 }
 

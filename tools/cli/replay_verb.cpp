@@ -86,6 +86,9 @@ int run(const Options& options) {
   publisher_options.endpoint = options.endpoint;
   publisher_options.source = protocol::topicNameFrom(performance.source);
   publisher_options.when_full = options.lossless ? protocol::WhenFull::lossless : protocol::WhenFull::wait;
+  // A quarter of a second at 60 frames: a subscriber that the system makes wait so long still gets every frame of a
+  // replay.
+  publisher_options.send_high_water_mark = 16;
   protocol::Publisher publisher(publisher_options);
   publisher.setCharacter(pipeline::characterOf(rig, !options.no_mesh));
 

@@ -38,7 +38,8 @@ std::string readUpTo(const capture::ByteSource& source, std::size_t limit) {
 void takeReport(capture::ReadReport report, Performance& out) {
   if (report.last_row_cut) {
     // A whole performance was asked for: half of one is not quietly passed off as it.
-    const std::string where = report.warnings.empty() ? std::string("the file ends in the middle of its last row") : report.warnings.back();
+    const std::string where =
+        report.warnings.empty() ? std::string("the file ends in the middle of its last row") : report.warnings.back();
     throw rig::InputError(where.substr(0, where.find(';')) + "; copy it again, or delete that row to use the rest");
   }
   out.lost = report.rows_equal_time;
