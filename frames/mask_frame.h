@@ -16,8 +16,8 @@ using MaskDisplacements = std::array<std::array<float, 3>, kFeaturePointCount>;
 
 // Where the head is. Camera frame: x right, y down, z away from the camera.
 struct HeadPose {
-  // Unit quaternion x, y, z, w: rotates the head frame, already turned to face the camera, away from looking straight in.
-  // Identity = a head that looks straight into an upright camera.
+  // Unit quaternion x, y, z, w of R in p_camera = diag(1, -1, -1) R p_head + translation: turns about the axes of an upright head that
+  // faces the camera (tracker/head_pose.h). Identity = a head that looks straight into an upright camera.
   std::array<float, 4> rotation{0.0F, 0.0F, 0.0F, 1.0F};
   // The same as angles; signs and order as tracker/head_pose.h defines and tests.
   float yaw_rad = 0.0F, pitch_rad = 0.0F, roll_rad = 0.0F;

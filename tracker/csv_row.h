@@ -27,7 +27,11 @@ class CsvRow {
     double value = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (error != std::errc{} || end != text.data() + text.size() || !(value >= low && value <= high))
-      fail(std::string(text).append(" is not a number from ").append(std::to_string(low)).append(" to ").append(std::to_string(high)));
+      fail(std::string(text)
+               .append(" is not a number from ")
+               .append(std::to_string(low))
+               .append(" to ")
+               .append(std::to_string(high)));
     return value;
   }
 
@@ -36,7 +40,8 @@ class CsvRow {
   }
 
   [[noreturn]] void fail(const std::string& what) const {
-    throw std::invalid_argument(std::string(where_).append(": column ").append(std::to_string(column_)).append(" ").append(what));
+    throw std::invalid_argument(
+        std::string(where_).append(": column ").append(std::to_string(column_)).append(" ").append(what));
   }
 
  private:

@@ -1,10 +1,12 @@
-// What is known of expressions before a face has been seen: how far each blendshape is usually used, and which go together.
+// What is known of expressions before a face has been seen: how far each blendshape is usually used, and which go
+// together.
 #pragma once
 
-#include <Eigen/Core>
 #include <array>
 #include <string>
 #include <string_view>
+
+#include <Eigen/Core>
 
 #include "frames/arkit_blendshapes.h"
 
@@ -21,8 +23,8 @@ class ExpressionPrior {
   // Throws std::invalid_argument, naming line and column.
   static ExpressionPrior parse(std::string_view csv, const std::string& name_for_errors);
 
-  // Second moment about zero: a weight's usual size. Symmetric, positive definite; correlations times `correlation` (0..1), so that
-  // what a few people do together does not become a rule for everybody.
+  // Second moment about zero: a weight's usual size. Symmetric, positive definite; correlations times `correlation`
+  // (0..1), so that what a few people do together does not become a rule for everybody.
   ShapeMatrix secondMoment(double correlation) const { return covarianceOf(rms_, correlation); }
   // Covariance about a recording's own mean.
   ShapeMatrix deviation(double correlation) const { return covarianceOf(deviation_, correlation); }
@@ -31,7 +33,6 @@ class ExpressionPrior {
   ShapeMatrix covarianceOf(const ShapeVector& scale, double correlation) const;
 
  private:
-
   ShapeVector rms_ = ShapeVector::Zero();
   ShapeVector deviation_ = ShapeVector::Zero();
   ShapeMatrix correlation_ = ShapeMatrix::Identity();

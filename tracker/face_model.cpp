@@ -1,10 +1,11 @@
 #include "tracker/face_model.h"
 
+#include <cmath>
+
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <Eigen/QR>
-#include <cmath>
 
 #include "tracker/mean_face.h"
 
@@ -40,8 +41,9 @@ Eigen::MatrixXd smoothCovariance(const rig::FeaturePointPositions& face, const S
                      std::exp(-(face.row(i) - face.row(j)).squaredNorm() / reach);
       if (i == j) kernel(i, j) += settings.shape_point_mm * settings.shape_point_mm;
     }
-  // Symmetric and antisymmetric parts of a field d under the mirror map m, (m d)_i = diag(-1, 1, 1) d_mirror(i), are independent; for
-  // a kernel that the mirror leaves as it is, the covariance of the part (1 +- m) / 2 d is (kernel +- kernel(., mirror)) / 2.
+  // Symmetric and antisymmetric parts of a field d under the mirror map m, (m d)_i = diag(-1, 1, 1) d_mirror(i), are
+  // independent; for a kernel that the mirror leaves as it is, the covariance of the part (1 +- m) / 2 d is (kernel +-
+  // kernel(., mirror)) / 2.
   const auto points = rig::featurePoints();
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(kAll, kAll);
   for (int i = 0; i < n; ++i)
@@ -90,16 +92,17 @@ ShapePrior::ShapePrior(const MeasuredPoints& points, const Settings& settings) :
   const Eigen::MatrixXd normal = seen.transpose() * seen;
   const Eigen::MatrixXd pick = normal.ldlt().solve(seen.transpose());  // 7 by 3P
   Eigen::MatrixXd all = smoothCovariance(face, settings);
-  const Eigen::MatrixXd measured_rows = rowsOf(all, points);                         // 3P by 252
-  const Eigen::MatrixXd once = all - directions * (pick * measured_rows);            // T S
-  const Eigen::MatrixXd measured_columns = rowsOf(once.transpose(), points);         // (T S)^T, measured rows
-  all = once - (directions * (pick * measured_columns)).transpose();                 // T S T^T
+  const Eigen::MatrixXd measured_rows = rowsOf(all, points);                            // 3P by 252
+  const Eigen::MatrixXd once = all - directions * (pick * measured_rows);               // T S
+  const Eigen::MatrixXd measured_columns = rowsOf(once.transpose(), points);            // (T S)^T, measured rows
+  all = once - (directions * (pick * measured_columns)).transpose();                    // T S T^T
   const Eigen::MatrixXd all_by_measured = rowsOf(all.transpose(), points).transpose();  // 252 by 3P
   covariance_ = rowsOf(all_by_measured, points);
   covariance_ = (0.5 * (covariance_ + covariance_.transpose())).eval();
 
   const int size = 3 * points.count();
-  const Eigen::MatrixXd free = seen * normal.llt().matrixL().solve(Eigen::MatrixXd::Identity(7, 7)).transpose();  // orthonormal
+  const Eigen::MatrixXd free =
+      seen * normal.llt().matrixL().solve(Eigen::MatrixXd::Identity(7, 7)).transpose();  // orthonormal
   Eigen::MatrixXd regular = covariance_ + kFreeVariance * free * free.transpose();
   regular.diagonal().array() += 1e-6;
   precision_ = regular.llt().solve(Eigen::MatrixXd::Identity(size, size));

@@ -1,10 +1,11 @@
-// The measured points of a face as a linear model: a neutral shape, a prior over such shapes, and what each expression adds.
-// Millimetres, head frame. Internal to the tracker.
+// The measured points of a face as a linear model: a neutral shape, a prior over such shapes, and what each expression
+// adds. Millimetres, head frame. Internal to the tracker.
 #pragma once
 
-#include <Eigen/Core>
 #include <array>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "rig/expression_table.h"
 #include "rig/fapu.h"
@@ -29,13 +30,18 @@ class ShapePrior {
  public:
   ShapePrior(const MeasuredPoints& points, const Settings& settings);
 
-  const Eigen::VectorXd& mean() const { return mean_; }              // 3P: x, y, z of each measured point
-  const Eigen::MatrixXd& covariance() const { return covariance_; }  // 3P by 3P; no rigid motion and no change of size in it
-  const Eigen::MatrixXd& precision() const { return precision_; }    // its inverse; a rigid motion or a change of size costs next to nothing
+  const Eigen::VectorXd& mean() const { return mean_; }  // 3P: x, y, z of each measured point
+  const Eigen::MatrixXd& covariance() const {
+    return covariance_;
+  }  // 3P by 3P; no rigid motion and no change of size in it
+  const Eigen::MatrixXd& precision() const {
+    return precision_;
+  }  // its inverse; a rigid motion or a change of size costs next to nothing
 
-  const Eigen::VectorXd& size() const { return size_; }              // 3P: what growing by 100 % adds, about the centre
+  const Eigen::VectorXd& size() const { return size_; }  // 3P: what growing by 100 % adds, about the centre
 
-  // All 84 points from a deviation of the measured ones from the mean: measured ones exactly, the others as their neighbours say.
+  // All 84 points from a deviation of the measured ones from the mean: measured ones exactly, the others as their
+  // neighbours say.
   rig::FeaturePointPositions complete(const Eigen::VectorXd& deviation) const;
 
  private:

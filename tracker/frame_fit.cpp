@@ -1,10 +1,11 @@
 #include "tracker/frame_fit.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <algorithm>
-#include <cmath>
 
 namespace volto::tracker {
 namespace {
@@ -59,7 +60,8 @@ bool FrameFit::evaluate(const Observation& seen, const ViewPose& pose, const Sha
   pose_gradient_.setZero();
   view_rows_ = seen.has_depth ? 3 : 2;
   for (int p = 0; p < points_.count(); ++p) {
-    const Eigen::Vector3d in_head = neutral_.segment<3>(3 * p) + Eigen::Vector3d(moved_[0][p], moved_[1][p], moved_[2][p]);
+    const Eigen::Vector3d in_head =
+        neutral_.segment<3>(3 * p) + Eigen::Vector3d(moved_[0][p], moved_[1][p], moved_[2][p]);
     position_.segment<3>(3 * p) = in_head;
     const Eigen::Vector3d in_view = pose.rotation * in_head + pose.translation;
     Eigen::Vector3d pull;  // A^T r
@@ -114,8 +116,8 @@ void FrameFit::composeNormalMatrices(const Observation& seen) {
     }
     for (int k = 0; k < kShapes; ++k)
       jacobian_.col(6 + k).segment(row * size, size).array() = a[0].array() * basis_->axes()[0].col(k).array() +
-                                                              a[1].array() * basis_->axes()[1].col(k).array() +
-                                                              a[2].array() * basis_->axes()[2].col(k).array();
+                                                               a[1].array() * basis_->axes()[1].col(k).array() +
+                                                               a[2].array() * basis_->axes()[2].col(k).array();
   }
   gram_.setZero();
   gram_.selfadjointView<Eigen::Lower>().rankUpdate(jacobian_.topRows(view_rows_ * size).transpose());
@@ -123,7 +125,8 @@ void FrameFit::composeNormalMatrices(const Observation& seen) {
   pose_information.diagonal().array() += 1e-9;
   normal_.pose_inverse = pose_information.inverse();
   normal_.cross = gram_.bottomLeftCorner<kShapes, 6>().transpose().cast<double>();
-  normal_.information = gram_.bottomRightCorner<kShapes, kShapes>().selfadjointView<Eigen::Lower>().toDenseMatrix().cast<double>();
+  normal_.information =
+      gram_.bottomRightCorner<kShapes, kShapes>().selfadjointView<Eigen::Lower>().toDenseMatrix().cast<double>();
   normal_.information.noalias() -= normal_.cross.transpose() * (normal_.pose_inverse * normal_.cross);
 }
 
@@ -211,7 +214,8 @@ bool FrameFit::initialisePose(const Observation& seen, ViewPose& pose) {
     if (w <= 0) continue;
     ++count;
     total += w;
-    image_mean += w * (seen.has_depth ? Eigen::Vector2d(seen.point.col(p).head<2>()) : Eigen::Vector2d(seen.ray.col(p)));
+    image_mean +=
+        w * (seen.has_depth ? Eigen::Vector2d(seen.point.col(p).head<2>()) : Eigen::Vector2d(seen.ray.col(p)));
     model_mean += w * neutral_.segment<2>(3 * p);
     if (seen.has_depth) depth_mean += w * (seen.point(2, p) - neutral_[3 * p + 2]);
   }
@@ -222,7 +226,8 @@ bool FrameFit::initialisePose(const Observation& seen, ViewPose& pose) {
   for (int p = 0; p < points_.count(); ++p) {
     const double w = seen.weight[p];
     if (w <= 0) continue;
-    const Eigen::Vector2d at = seen.has_depth ? Eigen::Vector2d(seen.point.col(p).head<2>()) : Eigen::Vector2d(seen.ray.col(p));
+    const Eigen::Vector2d at =
+        seen.has_depth ? Eigen::Vector2d(seen.point.col(p).head<2>()) : Eigen::Vector2d(seen.ray.col(p));
     const Eigen::Vector2d y = at - image_mean;
     const Eigen::Vector2d x = neutral_.segment<2>(3 * p) - model_mean;
     along += w * x.dot(y);
@@ -235,7 +240,8 @@ bool FrameFit::initialisePose(const Observation& seen, ViewPose& pose) {
   pose.rotation = Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   if (seen.has_depth) {
     pose.translation.z() = depth_mean / total;
-    pose.translation.head<2>() = image_mean - (pose.rotation * Eigen::Vector3d(model_mean.x(), model_mean.y(), 0)).head<2>();
+    pose.translation.head<2>() =
+        image_mean - (pose.rotation * Eigen::Vector3d(model_mean.x(), model_mean.y(), 0)).head<2>();
   } else {
     const double distance = std::sqrt(model_spread / image_spread);
     if (!(distance > 2 * kNearestDepth && distance < 1e6)) return false;

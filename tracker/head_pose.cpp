@@ -1,8 +1,9 @@
 #include "tracker/head_pose.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+
+#include <Eigen/Geometry>
 
 namespace volto::tracker {
 
@@ -14,7 +15,8 @@ Eigen::Matrix3d headRotation(const HeadAngles& angles) {
 }
 
 HeadAngles headAngles(const Eigen::Matrix3d& r) {
-  // Third column of Ry Rx Rz: (sin yaw cos pitch, -sin pitch, cos yaw cos pitch); second row: (cos p sin r, cos p cos r, -sin p).
+  // Third column of Ry Rx Rz: (sin yaw cos pitch, -sin pitch, cos yaw cos pitch); second row: (cos p sin r, cos p cos
+  // r, -sin p).
   HeadAngles angles;
   angles.pitch_rad = -std::asin(std::clamp(r(1, 2), -1.0, 1.0));
   if (std::abs(r(1, 2)) > 1.0 - 1e-9) {
@@ -30,12 +32,14 @@ void setHeadPose(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& transla
   Eigen::Quaterniond q(rotation);
   q.normalize();
   if (q.w() < 0) q.coeffs() = -q.coeffs();
-  out.rotation = {static_cast<float>(q.x()), static_cast<float>(q.y()), static_cast<float>(q.z()), static_cast<float>(q.w())};
+  out.rotation = {static_cast<float>(q.x()), static_cast<float>(q.y()), static_cast<float>(q.z()),
+                  static_cast<float>(q.w())};
   const HeadAngles angles = headAngles(rotation);
   out.yaw_rad = static_cast<float>(angles.yaw_rad);
   out.pitch_rad = static_cast<float>(angles.pitch_rad);
   out.roll_rad = static_cast<float>(angles.roll_rad);
-  for (int c = 0; c < 3; ++c) out.translation_mm[static_cast<std::size_t>(c)] = static_cast<float>(translation_camera_mm[c]);
+  for (int c = 0; c < 3; ++c)
+    out.translation_mm[static_cast<std::size_t>(c)] = static_cast<float>(translation_camera_mm[c]);
   out.observed = true;
 }
 

@@ -1,9 +1,11 @@
 // Which way a head turns: the signs and the order of the head angles in Volto.
 //
-// Head frame: +x to the subject's left, +y up, +z out of the face. A head that looks straight into an upright camera has rotation
-// identity; its axes are then x to the right in the image, y up, z towards the camera. For a point p of the head frame
+// Head frame: +x to the subject's left, +y up, +z out of the face. A head that looks straight into an upright camera
+// has rotation identity; its axes are then x to the right in the image, y up, z towards the camera. For a point p of
+// the head frame
 //   p_camera = diag(1, -1, -1) * R * p + translation,    R = Ry(yaw) * Rx(pitch) * Rz(roll),
-// with the camera frame x right, y down, z away, and R turning right-handed about the axes of the upright, camera-facing head:
+// with the camera frame x right, y down, z away, and R turning right-handed about the axes of the upright,
+// camera-facing head:
 //   yaw   > 0: the face turns to the subject's left (to the right in an image that is not mirrored),
 //   pitch > 0: the face turns down,
 //   roll  > 0: the head leans to the subject's right (its left ear comes up).
@@ -24,7 +26,8 @@ struct HeadAngles {
 
 Eigen::Matrix3d headRotation(const HeadAngles& angles);
 
-// The inverse of headRotation. `rotation` must be a rotation matrix; at pitch = +-pi/2 yaw takes the whole turn and roll is 0.
+// The inverse of headRotation. `rotation` must be a rotation matrix; at pitch = +-pi/2 yaw takes the whole turn and
+// roll is 0.
 HeadAngles headAngles(const Eigen::Matrix3d& rotation);
 
 // Fills quaternion (w >= 0), angles, translation and `observed = true`.

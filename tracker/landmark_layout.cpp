@@ -10,7 +10,8 @@ namespace {
 
 constexpr double kOutlineTrust = 0.5;
 
-// OpenSeeFace's 66 points are the 68 without the two inner lip corners, the mouth counted anew (OpenSee.cs, facetracker.py).
+// OpenSeeFace's 66 points are the 68 without the two inner lip corners, the mouth counted anew (OpenSee.cs,
+// facetracker.py).
 std::int16_t openSeeFaceFromIbug(int ibug) {
   if (ibug < 48) return static_cast<std::int16_t>(ibug);
   if (ibug == 48) return 58;
@@ -26,7 +27,8 @@ LayoutTable makeTable(LandmarkLayout layout) {
   LayoutTable table;
   const auto points = rig::featurePoints();
   for (std::size_t i = 0; i < kFeaturePointCount; ++i) {
-    // A point between two landmarks (3.1 to 3.4) is not measured twice: the landmarks have points of their own in group 12.
+    // A point between two landmarks (3.1 to 3.4) is not measured twice: the landmarks have points of their own in
+    // group 12.
     const bool own = points[i].ibug68[0] >= 0 && points[i].ibug68[1] < 0;
     const int ibug = own ? points[i].ibug68[0] : -1;
     table.landmark[i] = static_cast<std::int16_t>(ibug);
@@ -40,9 +42,12 @@ LayoutTable makeTable(LandmarkLayout layout) {
 
 std::string_view layoutName(LandmarkLayout layout) {
   switch (layout) {
-    case LandmarkLayout::ibug68: return "ibug68";
-    case LandmarkLayout::openseeface66: return "openseeface66";
-    case LandmarkLayout::mediapipe478: return "mediapipe478";
+    case LandmarkLayout::ibug68:
+      return "ibug68";
+    case LandmarkLayout::openseeface66:
+      return "openseeface66";
+    case LandmarkLayout::mediapipe478:
+      return "mediapipe478";
   }
   return "unknown";
 }
@@ -51,9 +56,12 @@ const LayoutTable& layoutTable(LandmarkLayout layout) {
   static const LayoutTable ibug68 = makeTable(LandmarkLayout::ibug68);
   static const LayoutTable openseeface66 = makeTable(LandmarkLayout::openseeface66);
   switch (layout) {
-    case LandmarkLayout::ibug68: return ibug68;
-    case LandmarkLayout::openseeface66: return openseeface66;
-    case LandmarkLayout::mediapipe478: break;
+    case LandmarkLayout::ibug68:
+      return ibug68;
+    case LandmarkLayout::openseeface66:
+      return openseeface66;
+    case LandmarkLayout::mediapipe478:
+      break;
   }
   throw std::invalid_argument("landmark layout " + std::string(layoutName(layout)) +
                               " is not understood by the tracker; use ibug68 or openseeface66");

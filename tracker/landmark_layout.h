@@ -15,8 +15,8 @@ std::string_view layoutName(LandmarkLayout layout);
 // What the tracker needs to know of a layout. One row per feature point; -1: this layout has no landmark there.
 struct LayoutTable {
   std::array<std::int16_t, kFeaturePointCount> landmark;
-  // How far a landmark can be believed, 0..1: the face's outline is drawn where the face ends in the image, so its points slide over
-  // the skin as the head turns, and a detector draws them least surely.
+  // How far a landmark can be believed, 0..1: the face's outline is drawn where the face ends in the image, so its
+  // points slide over the skin as the head turns, and a detector draws them least surely.
   std::array<double, kFeaturePointCount> trust;
 };
 

@@ -10,8 +10,10 @@ rig::FeaturePointPositions parseMeanFace(std::string_view csv, const std::string
   rig::FeaturePointPositions face;
   int next = -1;  // -1: header
   forEachCsvRow(csv, name, [&](CsvRow& row) {
-    if (next >= static_cast<int>(kFeaturePointCount)) row.fail("belongs to a row too many; there are 84 feature points");
-    const std::string_view expected = next < 0 ? "feature_point" : rig::featurePoints()[static_cast<std::size_t>(next)].id;
+    if (next >= static_cast<int>(kFeaturePointCount))
+      row.fail("belongs to a row too many; there are 84 feature points");
+    const std::string_view expected =
+        next < 0 ? "feature_point" : rig::featurePoints()[static_cast<std::size_t>(next)].id;
     const std::string_view first = row.field();
     if (first != expected) row.fail(std::string("is ").append(first).append(", expected ").append(expected));
     if (next >= 0) {

@@ -1,9 +1,10 @@
 // Offline: the actor's face at rest from a second of rest, or from a whole take.
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <vector>
+
+#include <Eigen/Cholesky>
 
 #include "tracker/face_model.h"
 #include "tracker/frame_fit.h"
@@ -27,7 +28,8 @@ LandmarkLayout layoutOf(std::span<const LandmarkFrame> frames) {
 }
 
 // Every frame that shows a face, at most `most` of them, spread evenly.
-std::vector<Face> readFaces(std::span<const LandmarkFrame> frames, std::size_t most, Observer& observer, FrameFit& fit) {
+std::vector<Face> readFaces(std::span<const LandmarkFrame> frames, std::size_t most, Observer& observer,
+                            FrameFit& fit) {
   std::vector<std::size_t> good;
   std::vector<Face> faces;
   Face face{makeObservation(static_cast<int>(fit.points().count())), {}, 0};
@@ -44,7 +46,8 @@ std::vector<Face> readFaces(std::span<const LandmarkFrame> frames, std::size_t m
     face.time_s = static_cast<double>(frame.t_capture_ns) * 1e-9;
     faces.push_back(face);
   }
-  if (faces.empty()) throw std::invalid_argument("the landmarks form no face; give landmarks of a face in their layout's order");
+  if (faces.empty())
+    throw std::invalid_argument("the landmarks form no face; give landmarks of a face in their layout's order");
   return faces;
 }
 
@@ -84,7 +87,8 @@ NeutralFace neutralFromRest(std::span<const LandmarkFrame> rest, const TrackerOp
       pull += fit.gradient() / variance;
       fit.addPointInformation(face.seen, blocks);
     }
-    for (int p = 0; p < points.count(); ++p) normal.block<3, 3>(3 * p, 3 * p) += blocks.block<3, 3>(0, 3 * p) / variance;
+    for (int p = 0; p < points.count(); ++p)
+      normal.block<3, 3>(3 * p, 3 * p) += blocks.block<3, 3>(0, 3 * p) / variance;
     deviation += normal.llt().solve(pull - shape.precision() * deviation);
     if (pass >= 5) {
       // Frames that do not look like the others (a blink) are left out.
@@ -96,12 +100,14 @@ NeutralFace neutralFromRest(std::span<const LandmarkFrame> rest, const TrackerOp
   return makeNeutralFace(shape, points, deviation, observer.scale());
 }
 
-NeutralFace neutralFromTake(std::span<const LandmarkFrame> take, const TrackerOptions& options, const rig::ExpressionTable& table) {
+NeutralFace neutralFromTake(std::span<const LandmarkFrame> take, const TrackerOptions& options,
+                            const rig::ExpressionTable& table) {
   return neutralFromTake(take, options, table, Settings{}, ExpressionPrior::standard());
 }
 
-NeutralFace neutralFromTake(std::span<const LandmarkFrame> take, const TrackerOptions& options, const rig::ExpressionTable& table,
-                            const Settings& settings, const ExpressionPrior& expression) {
+NeutralFace neutralFromTake(std::span<const LandmarkFrame> take, const TrackerOptions& options,
+                            const rig::ExpressionTable& table, const Settings& settings,
+                            const ExpressionPrior& expression) {
   const MeasuredPoints points = measuredPoints(layoutTable(layoutOf(take)));
   const ShapePrior shape(points, settings);
   const ExpressionBasis basis(points, table);

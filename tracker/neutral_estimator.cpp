@@ -1,9 +1,11 @@
 #include "tracker/neutral_estimator.h"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
-#include <algorithm>
-#include <cmath>
 
 namespace volto::tracker {
 namespace {
@@ -12,14 +14,25 @@ constexpr int kSweeps = 10;
 constexpr int kLinearisePeriod = 8;
 constexpr int kSolveStepsPerPiece = 4;
 constexpr int kMostSolveSteps = 60;
-constexpr int kPassesBeforeRest = 3;    // the deviations must have settled before rest is looked for
-constexpr double kMostGain = 2.0;       // by which a variance may change faster than by plain expectation maximisation
-constexpr double kBelowRest = 3.0;      // a usual expression that makes weights negative is so much less likely than one above rest
+constexpr int kPassesBeforeRest = 3;  // the deviations must have settled before rest is looked for
+constexpr double kMostGain = 2.0;     // by which a variance may change faster than by plain expectation maximisation
+constexpr double kBelowRest =
+    3.0;  // a usual expression that makes weights negative is so much less likely than one above rest
+
+const std::array<int, kArkitBlendshapeCount>& mirrorShapes() {
+  static const std::array<int, kArkitBlendshapeCount> mirror = [] {
+    std::array<int, kArkitBlendshapeCount> m;
+    for (std::size_t k = 0; k < kArkitBlendshapeCount; ++k) m[k] = static_cast<int>(arkitMirrorIndex(k));
+    return m;
+  }();
+  return mirror;
+}
 
 }  // namespace
 
-NeutralEstimator::NeutralEstimator(const MeasuredPoints& points, const ShapePrior& shape, const rig::ExpressionTable& table,
-                                   const ExpressionPrior& expression, const Settings& settings, int capacity)
+NeutralEstimator::NeutralEstimator(const MeasuredPoints& points, const ShapePrior& shape,
+                                   const rig::ExpressionTable& table, const ExpressionPrior& expression,
+                                   const Settings& settings, int capacity)
     : points_(points),
       settings_(settings),
       table_(&table),
@@ -46,10 +59,12 @@ NeutralEstimator::NeutralEstimator(const MeasuredPoints& points, const ShapePrio
     s.seen.point.setZero(3, points.count());
     s.seen.weight.setZero(points.count());
   }
-  mean_ = neutral_ = pull_ = solution_ = direction_ = remainder_ = product_ = preconditioned_ = Eigen::VectorXd::Zero(size);
+  mean_ = neutral_ = pull_ = solution_ = direction_ = remainder_ = product_ = preconditioned_ =
+      Eigen::VectorXd::Zero(size);
   block_.setZero(3, size);
   habits_ = general_;
   sorted_.reserve(store_.size());
+  mirrorShapes();  // made here, not in the first frame
 }
 
 void NeutralEstimator::fixNeutral(const Eigen::VectorXd& deviation, const rig::FeaturePointPositions& neutral_mm,
@@ -66,7 +81,8 @@ void NeutralEstimator::fixNeutral(const Eigen::VectorXd& deviation, const rig::F
 void NeutralEstimator::add(const Observation& seen, const ViewPose& pose, double time_s) {
   if (count_ == static_cast<int>(store_.size())) {
     int kept = 0;
-    for (int i = 0; i < count_; i += 2) std::swap(store_[static_cast<std::size_t>(kept++)], store_[static_cast<std::size_t>(i)]);
+    for (int i = 0; i < count_; i += 2)
+      std::swap(store_[static_cast<std::size_t>(kept++)], store_[static_cast<std::size_t>(i)]);
     count_ = kept;
     interval_s_ *= 2;
     stage_ = Stage::begin;  // a pass under way has sums of frames that are gone
@@ -137,7 +153,8 @@ void NeutralEstimator::fitOne(Stored& stored) {
   if (fixed_) stored.weights = stored.weights.cwiseMax(0.0);
   // A stored frame is linearised again now and then only: its pose hardly moves any more.
   const bool linearise = stored.fits < 2 || stored.fits % kLinearisePeriod == 0;
-  if (!fit_.improve(stored.seen, prior_, 1, kSweeps, stored.pose, stored.weights, linearise ? nullptr : &stored.normal)) {
+  if (!fit_.improve(stored.seen, prior_, 1, kSweeps, stored.pose, stored.weights,
+                    linearise ? nullptr : &stored.normal)) {
     // No head in this frame's points any more: start it again from the present mean.
     stored.weights.setZero();
     stored.fits = 0;
@@ -212,8 +229,9 @@ bool NeutralEstimator::solveSome() {
 
 void NeutralEstimator::learnHabits() {
   const ShapeMatrix open = (information_ + prior_.precision).llt().solve(ShapeMatrix::Identity());
-  // Expectation maximisation creeps where the points say little (its estimate grows by the share that they explain), so the scatter is
-  // scaled up to what it would settle at (D. MacKay: Bayesian interpolation, 1992: variance = scatter / well determined share).
+  // Expectation maximisation creeps where the points say little (its estimate grows by the share that they explain), so
+  // the scatter is scaled up to what it would settle at (D. MacKay: Bayesian interpolation, 1992: variance = scatter /
+  // well determined share).
   ShapeVector gain;
   for (int k = 0; k < kShapes; ++k) {
     const double determined = std::max(1 - open(k, k) / habits_(k, k), 0.05);
@@ -224,8 +242,7 @@ void NeutralEstimator::learnHabits() {
   // Left and right are used alike in the long run.
   for (int a = 0; a < kShapes; ++a)
     for (int b = 0; b <= a; ++b) {
-      const int ma = static_cast<int>(arkitMirrorIndex(static_cast<std::size_t>(a)));
-      const int mb = static_cast<int>(arkitMirrorIndex(static_cast<std::size_t>(b)));
+      const int ma = mirrorShapes()[static_cast<std::size_t>(a)], mb = mirrorShapes()[static_cast<std::size_t>(b)];
       const double value = 0.25 * (seen(a, b) + seen(b, a) + seen(ma, mb) + seen(mb, ma));
       seen(a, b) = seen(b, a) = seen(ma, mb) = seen(mb, ma) = value;
     }
@@ -250,8 +267,8 @@ void NeutralEstimator::findRest() {
   }
   // A quantile of few frames may be far above rest.
   const double n = independentFrames();
-  const ShapeVector doubt = (ShapeVector::Constant(settings_.rest_deviation * settings_.rest_deviation) +
-                             habits_.diagonal() * (4 / (n * n)));
+  const ShapeVector doubt =
+      (ShapeVector::Constant(settings_.rest_deviation * settings_.rest_deviation) + habits_.diagonal() * (4 / (n * n)));
   const ShapeVector pull = rest_pull_ * mean_;
   ShapeVector slope = pull - rest_normal_ * rest;
   usual_ = rest;

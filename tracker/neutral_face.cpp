@@ -1,18 +1,21 @@
 #include "tracker/neutral_face.h"
 
-#include <Eigen/SVD>
-#include <Eigen/LU>
 #include <cmath>
 #include <stdexcept>
 
+#include <Eigen/LU>
+#include <Eigen/SVD>
+
 namespace volto::tracker {
 
-NeutralFace makeNeutralFace(const ShapePrior& shape, const MeasuredPoints& points, const Eigen::VectorXd& deviation, double scale) {
+NeutralFace makeNeutralFace(const ShapePrior& shape, const MeasuredPoints& points, const Eigen::VectorXd& deviation,
+                            double scale) {
   NeutralFace face;
   face.positions_mm = scale * shape.complete(deviation);
   face.confidence.fill(0.5F);
   for (int p = 0; p < points.count(); ++p)
-    face.confidence[static_cast<std::size_t>(points.feature[static_cast<std::size_t>(p)])] = static_cast<float>(points.trust[p]);
+    face.confidence[static_cast<std::size_t>(points.feature[static_cast<std::size_t>(p)])] =
+        static_cast<float>(points.trust[p]);
   return face;
 }
 
@@ -36,10 +39,10 @@ Deviation deviationOf(const NeutralFace& face, const ShapePrior& shape, const Me
   if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) sign.z() = -1;
   const Eigen::Matrix3d rotation = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
   const double scale = svd.singularValues().dot(sign) / spread;
-  if (!(scale > 1e-6 && scale < 1e6)) throw std::invalid_argument("the neutral face does not look like a face; measure it again");
+  if (!(scale > 1e-6 && scale < 1e6))
+    throw std::invalid_argument("the neutral face does not look like a face; measure it again");
   Eigen::VectorXd deviation(3 * points.count());
-  for (int p = 0; p < points.count(); ++p)
-    deviation.segment<3>(3 * p) = scale * rotation * given.col(p) - mean.col(p);
+  for (int p = 0; p < points.count(); ++p) deviation.segment<3>(3 * p) = scale * rotation * given.col(p) - mean.col(p);
   return {deviation, 1 / scale};
 }
 

@@ -10,10 +10,11 @@
 
 namespace volto::tracker {
 
-NeutralFace makeNeutralFace(const ShapePrior& shape, const MeasuredPoints& points, const Eigen::VectorXd& deviation, double scale);
+NeutralFace makeNeutralFace(const ShapePrior& shape, const MeasuredPoints& points, const Eigen::VectorXd& deviation,
+                            double scale);
 
-// The face turned, moved and scaled onto the mean face, less the mean face (3P), and its size relative to the mean face. Throws
-// std::invalid_argument (Tracker::setNeutral).
+// The face turned, moved and scaled onto the mean face, less the mean face (3P), and its size relative to the mean
+// face. Throws std::invalid_argument (Tracker::setNeutral).
 struct Deviation {
   Eigen::VectorXd points;
   double scale;
@@ -21,7 +22,8 @@ struct Deviation {
 Deviation deviationOf(const NeutralFace& face, const ShapePrior& shape, const MeasuredPoints& points);
 
 // With settings and statistics of one's own, for measuring them.
-NeutralFace neutralFromTake(std::span<const LandmarkFrame> take, const TrackerOptions& options, const rig::ExpressionTable& table,
-                            const Settings& settings, const ExpressionPrior& expression);
+NeutralFace neutralFromTake(std::span<const LandmarkFrame> take, const TrackerOptions& options,
+                            const rig::ExpressionTable& table, const Settings& settings,
+                            const ExpressionPrior& expression);
 
 }  // namespace volto::tracker

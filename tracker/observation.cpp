@@ -7,12 +7,13 @@
 namespace volto::tracker {
 namespace {
 
-// A focal length for a camera that nobody described, as a multiple of the image's longer side. 1 is a horizontal field of view of 53
-// degrees, between webcams (60 to 80) and portrait lenses.
+// A focal length for a camera that nobody described, as a multiple of the image's longer side. 1 is a horizontal field
+// of view of 53 degrees, between webcams (60 to 80) and portrait lenses.
 constexpr double kGuessedFocalLength = 1.0;
 constexpr double kLargestPixel = 1e5;
 constexpr double kLeastConfidence = 0.05;
-constexpr double kOtherSize = 0.15;  // a face this much larger or smaller than expected is not the one that was measured
+constexpr double kOtherSize =
+    0.15;  // a face this much larger or smaller than expected is not the one that was measured
 
 // The smallest usual image that holds all points; for landmark files that do not say.
 std::array<double, 2> guessImageSize(const LandmarkFrame& frame) {
@@ -21,7 +22,8 @@ std::array<double, 2> guessImageSize(const LandmarkFrame& frame) {
     if (std::isfinite(p[0])) right = std::max(right, static_cast<double>(p[0]));
     if (std::isfinite(p[1])) bottom = std::max(bottom, static_cast<double>(p[1]));
   }
-  constexpr std::array<std::array<double, 2>, 5> kUsual = {{{640, 480}, {1280, 720}, {1920, 1080}, {2560, 1440}, {3840, 2160}}};
+  constexpr std::array<std::array<double, 2>, 5> kUsual = {
+      {{640, 480}, {1280, 720}, {1920, 1080}, {2560, 1440}, {3840, 2160}}};
   for (const auto& size : kUsual)
     if (right <= 1.02 * size[0] && bottom <= 1.02 * size[1]) return size;
   return {right, bottom};
@@ -72,7 +74,8 @@ bool Observer::read(const LandmarkFrame& frame, Observation& out) {
   int missing = 0;
   for (int p = 0; p < points_.count(); ++p) {
     if (!frame.point_confidence.empty()) {
-      const float confidence = frame.point_confidence[static_cast<std::size_t>(points_.landmark[static_cast<std::size_t>(p)])];
+      const float confidence =
+          frame.point_confidence[static_cast<std::size_t>(points_.landmark[static_cast<std::size_t>(p)])];
       out.weight[p] *= confidence >= kLeastConfidence ? std::min(static_cast<double>(confidence), 1.0) : 0.0;
     }
     if (out.weight[p] <= 0) ++missing;
@@ -116,7 +119,8 @@ bool Observer::read3d(const LandmarkFrame& frame, Observation& out) {
     }
     const double ratio = std::sqrt(spread / model_spread);
     if (!(ratio > 1e-3 && ratio < 1e3)) return false;
-    // One size for the whole stream: what an expression adds to the first frame's, the neutral's estimate takes out again.
+    // One size for the whole stream: what an expression adds to the first frame's, the neutral's estimate takes out
+    // again.
     if (!scale_known_ || std::abs(ratio / scale_ - 1) > kOtherSize) scale_ = ratio;
     scale_checked_ = true;
   }

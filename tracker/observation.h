@@ -1,4 +1,5 @@
-// From a LandmarkFrame to the points that the fit works on: camera, missing points, scale of 3D input. Internal to the tracker.
+// From a LandmarkFrame to the points that the fit works on: camera, missing points, scale of 3D input. Internal to the
+// tracker.
 #pragma once
 
 #include "frames/landmark_frame.h"
@@ -16,8 +17,8 @@ class Observer {
  public:
   Observer(const MeasuredPoints& points, const Eigen::VectorXd& mean_face, const ObserverOptions& options);
 
-  // False when the frame shows no face, has arrays of the wrong length, or more than a quarter of its points are not finite or not
-  // believed by the detector. A single bad point is marked missing. Allocates nothing.
+  // False when the frame shows no face, has arrays of the wrong length, or more than a quarter of its points are not
+  // finite or not believed by the detector. A single bad point is marked missing. Allocates nothing.
   bool read(const LandmarkFrame& frame, Observation& out);
 
   // Size of this face relative to the mean face: 1 for 2D input, where size and distance cannot be told apart.

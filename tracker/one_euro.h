@@ -1,5 +1,6 @@
-// One-Euro filter: a first-order low pass whose cut-off rises with speed, so that a face at rest is still and a fast one is not late.
-// G. Casiez, N. Roussel, D. Vogel: 1 euro filter: a simple speed-based low-pass filter for noisy input in interactive systems, CHI 2012.
+// One-Euro filter: a first-order low pass whose cut-off rises with speed, so that a face at rest is still and a fast
+// one is not late. G. Casiez, N. Roussel, D. Vogel: 1 euro filter: a simple speed-based low-pass filter for noisy input
+// in interactive systems, CHI 2012.
 #pragma once
 
 namespace volto::tracker {
@@ -13,7 +14,8 @@ struct OneEuroConstants {
 // One signal. Allocates nothing; the state is three numbers.
 class OneEuro {
  public:
-  // dt_s > 0. `smoothing` divides the cut-off at rest: 1 as the constants say, 2 twice as stiff. 0 passes the signal through.
+  // dt_s > 0. `smoothing` divides the cut-off at rest: 1 as the constants say, 2 twice as stiff. 0 passes the signal
+  // through.
   double push(double value, double dt_s, const OneEuroConstants& constants, double smoothing);
   // The next value is taken as it is.
   void reset() { empty_ = true; }

@@ -6,8 +6,8 @@
 namespace volto::tracker {
 namespace {
 
-// Weights are 0..1, so a speed of 5 per second is a mouth that opens in 0.2 s: with beta 15 its cut-off is 75 Hz above the one at rest. The fit
-// itself knows that expressions persist (Settings::expression_memory_s), so these are light.
+// Weights are 0..1, so a speed of 5 per second is a mouth that opens in 0.2 s: with beta 15 its cut-off is 75 Hz above
+// the one at rest. The fit itself knows that expressions persist (Settings::expression_memory_s), so these are light.
 constexpr OneEuroConstants kLids{12.0, 15.0};
 constexpr OneEuroConstants kBrows{5.0, 5.0};
 constexpr OneEuroConstants kMouth{12.0, 15.0};
@@ -30,11 +30,14 @@ OneEuroConstants constantsOf(rig::FaceRegion region) {
     case rig::FaceRegion::left_upper_lid:
     case rig::FaceRegion::left_lower_lid:
     case rig::FaceRegion::right_upper_lid:
-    case rig::FaceRegion::right_lower_lid: return kLidPoints;
+    case rig::FaceRegion::right_lower_lid:
+      return kLidPoints;
     case rig::FaceRegion::upper_lip:
     case rig::FaceRegion::lower_lip:
-    case rig::FaceRegion::chin: return kMouthPoints;
-    default: return kOtherPoints;
+    case rig::FaceRegion::chin:
+      return kMouthPoints;
+    default:
+      return kOtherPoints;
   }
 }
 
@@ -53,7 +56,8 @@ void RegionFilters::reset() {
 
 void RegionFilters::push(double dt_s, double smoothing, ArkitWeights& weights, rig::FeaturePointPositions& rest_mm) {
   for (std::size_t k = 0; k < kArkitBlendshapeCount; ++k)
-    weights[k] = std::clamp(static_cast<float>(shapes_[k].push(weights[k], dt_s, shape_constants_[k], smoothing)), 0.0F, 1.0F);
+    weights[k] =
+        std::clamp(static_cast<float>(shapes_[k].push(weights[k], dt_s, shape_constants_[k], smoothing)), 0.0F, 1.0F);
   for (std::size_t i = 0; i < kFeaturePointCount; ++i)
     for (std::size_t c = 0; c < 3; ++c) {
       double& value = rest_mm(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(c));

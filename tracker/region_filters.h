@@ -1,5 +1,5 @@
-// One-Euro filters for a MaskFrame: constants per region of the face, since a lid closes in 0.1 s and a brow takes its time.
-// Internal to the tracker.
+// One-Euro filters for a MaskFrame: constants per region of the face, since a lid closes in 0.1 s and a brow takes its
+// time. Internal to the tracker.
 #pragma once
 
 #include <array>

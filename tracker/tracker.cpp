@@ -1,9 +1,10 @@
 #include "tracker/tracker.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <optional>
+
+#include <Eigen/Cholesky>
 
 #include "rig/fapu.h"
 #include "tracker/face_model.h"
@@ -22,8 +23,8 @@ namespace {
 
 constexpr int kIterations = 3;
 constexpr int kSweeps = 8;
-constexpr double kPoorFit_mm = 3.0;      // beyond this the pose may have gone astray and is looked for anew
-constexpr double kNoFace_mm = 9.0;       // beyond this the points are no face
+constexpr double kPoorFit_mm = 3.0;  // beyond this the pose may have gone astray and is looked for anew
+constexpr double kNoFace_mm = 9.0;   // beyond this the points are no face
 constexpr double kSmallestStep_s = 0.001, kLargestStep_s = 0.25;
 constexpr double kNeutralBlend_s = 0.3;  // a better neutral is blended in over about this time
 constexpr double kReturn_s = 0.25;       // a face that came back is blended in over this time
@@ -132,7 +133,7 @@ struct Tracker::State {
   // Expression statistics in use.
   ShapeMatrix precision;
   ShapeVector usual;
-  bool known = false;    // the neutral rests on this actor's frames
+  bool known = false;  // the neutral rests on this actor's frames
   double known_s = 0;
 
   // This stream.
@@ -146,8 +147,8 @@ struct Tracker::State {
   rig::FeaturePointPositions rest_mm = rig::FeaturePointPositions::Zero();
 
   // Lost and found.
-  MaskFrame last_good;        // as it was put out
-  MaskFrame shown;            // what was put out last
+  MaskFrame last_good;  // as it was put out
+  MaskFrame shown;      // what was put out last
   bool ever_shown = false;
   double lost_s = 0;
   double back_s = kReturn_s;  // since the face came back
@@ -187,7 +188,8 @@ bool Tracker::State::track(double dt_s) {
 void Tracker::State::learn(double time_s, double dt_s) {
   Parts& p = *parts;
   if (p.estimator.wants(time_s)) p.estimator.add(p.seen, pose, time_s);
-  const int pieces = p.estimator.passes() < settings.early_passes ? settings.early_pieces_per_frame : settings.pieces_per_frame;
+  const int pieces =
+      p.estimator.passes() < settings.early_passes ? settings.early_pieces_per_frame : settings.pieces_per_frame;
   for (int piece = 0; piece < pieces; ++piece)
     if (p.estimator.work()) adoptEstimate();
   if (known && !fixed) known_s += dt_s;
@@ -261,7 +263,8 @@ void mixExpression(const MaskFrame& from, const MaskFrame& to, float share, Mask
   for (std::size_t i = 0; i < kFeaturePointCount; ++i)
     for (std::size_t c = 0; c < 3; ++c)
       out.displacement_fapu[i][c] = mix(from.displacement_fapu[i][c], to.displacement_fapu[i][c], share);
-  for (std::size_t k = 0; k < kArkitBlendshapeCount; ++k) out.arkit_weights[k] = mix(from.arkit_weights[k], to.arkit_weights[k], share);
+  for (std::size_t k = 0; k < kArkitBlendshapeCount; ++k)
+    out.arkit_weights[k] = mix(from.arkit_weights[k], to.arkit_weights[k], share);
 }
 
 }  // namespace

@@ -19,39 +19,43 @@ class ExpressionPrior;  // tracker/expression_prior.h
 struct NeutralFace {
   rig::FeaturePointPositions positions_mm;
   std::array<float, kFeaturePointCount> confidence{};  // 1 measured, towards 0 as inferred
-  // How this actor uses the 52 shapes, as far as a take has shown it: usual weight, and deviation from it. All zero: not known.
+  // How this actor uses the 52 shapes, as far as a take has shown it: usual weight, and deviation from it. All zero:
+  // not known.
   ArkitWeights usual{};
   ArkitWeights deviation{};
 };
 
 struct TrackerOptions {
-  bool use_3d = true;              // false: 2D points only, even where the input has 3D
-  double focal_length_px = 0;      // 0: as the input says, else guessed from the image size
-  double smoothing = 1.0;          // 0: no filter; more = smoother and later. Scales the per-region filters.
-  double hold_s = 0.2;             // a lost face: the last good expression is held so long ...
-  double ease_s = 0.5;             // ... and then led back to neutral in so long
+  bool use_3d = true;          // false: 2D points only, even where the input has 3D
+  double focal_length_px = 0;  // 0: as the input says, else guessed from the image size
+  double smoothing = 1.0;      // 0: no filter; more = smoother and later. Scales the per-region filters.
+  double hold_s = 0.2;         // a lost face: the last good expression is held so long ...
+  double ease_s = 0.5;         // ... and then led back to neutral in so long
 };
 
-// One face of one stream. One thread at a time; two trackers share nothing. The same frames give the same output to the bit.
+// One face of one stream. One thread at a time; two trackers share nothing. The same frames give the same output to the
+// bit.
 class Tracker {
  public:
-  explicit Tracker(const TrackerOptions& options = {}, const rig::ExpressionTable& table = rig::ExpressionTable::standard());
+  explicit Tracker(const TrackerOptions& options = {},
+                   const rig::ExpressionTable& table = rig::ExpressionTable::standard());
   // With constants and statistics of one's own, for measuring them. `expression` must outlive the tracker.
-  Tracker(const TrackerOptions& options, const rig::ExpressionTable& table, const Settings& settings, const ExpressionPrior& expression);
+  Tracker(const TrackerOptions& options, const rig::ExpressionTable& table, const Settings& settings,
+          const ExpressionPrior& expression);
   ~Tracker();
   Tracker(Tracker&&) noexcept;
   Tracker& operator=(Tracker&&) noexcept;
 
-  // From now on this is the actor's neutral; the stream no longer changes it. Position and rotation do not matter, and size only for 3D
-  // input. Throws std::invalid_argument when a position is not finite or the face has no extent.
+  // From now on this is the actor's neutral; the stream no longer changes it. Position and rotation do not matter, and
+  // size only for 3D input. Throws std::invalid_argument when a position is not finite or the face has no extent.
   void setNeutral(const NeutralFace& neutral);
   // What the stream has shown so far; the mean face before that.
   NeutralFace neutral() const;
 
-  // One frame in, one frame out, in order of time. Allocates nothing after the first frame of a layout. Output is always finite.
-  // A frame whose time does not advance, that has arrays of the wrong length, or of whose points more than a quarter are not finite,
-  // counts as a lost face; a few bad points are bridged by the others. Throws std::invalid_argument for a layout that the tracker does
-  // not know (tracker/landmark_layout.h).
+  // One frame in, one frame out, in order of time. Allocates nothing after the first frame of a layout. Output is
+  // always finite. A frame whose time does not advance, that has arrays of the wrong length, or of whose points more
+  // than a quarter are not finite, counts as a lost face; a few bad points are bridged by the others. Throws
+  // std::invalid_argument for a layout that the tracker does not know (tracker/landmark_layout.h).
   void push(const LandmarkFrame& in, MaskFrame& out);
 
  private:
@@ -63,8 +67,8 @@ class Tracker {
 // std::invalid_argument when no frame shows a face, or for an unknown layout.
 NeutralFace neutralFromRest(std::span<const LandmarkFrame> rest, const TrackerOptions& options = {});
 
-// A whole take at once, when there is one: better than what a live stream can know, because it has seen everything. Throws
-// std::invalid_argument when no frame shows a face, or for an unknown layout.
+// A whole take at once, when there is one: better than what a live stream can know, because it has seen everything.
+// Throws std::invalid_argument when no frame shows a face, or for an unknown layout.
 NeutralFace neutralFromTake(std::span<const LandmarkFrame> take, const TrackerOptions& options = {},
                             const rig::ExpressionTable& table = rig::ExpressionTable::standard());
 

@@ -1,6 +1,5 @@
-// Accuracy on the public takes with known truth, from the pixels alone. The bounds are a little looser than what was measured.
-#include <gtest/gtest.h>
-
+// Accuracy on the public takes with known truth, from the pixels alone. The bounds are a little looser than what was
+// measured.
 #include <charconv>
 #include <cmath>
 #include <filesystem>
@@ -8,6 +7,8 @@
 #include <iterator>
 #include <map>
 #include <numbers>
+
+#include <gtest/gtest.h>
 
 #include "capture/openface_csv.h"
 #include "tests/support/test_data.h"
@@ -116,7 +117,8 @@ Score score(const std::vector<MaskFrame>& masks, const Truth& truth, const Energ
     };
     double mean = 0, error = 0;
     for (std::size_t i = 0; i < n; ++i) mean += (angle(i) - truth.head_deg[i][axis]) / static_cast<double>(n);
-    for (std::size_t i = 0; i < n; ++i) error += std::abs(angle(i) - truth.head_deg[i][axis] - mean) / static_cast<double>(n);
+    for (std::size_t i = 0; i < n; ++i)
+      error += std::abs(angle(i) - truth.head_deg[i][axis] - mean) / static_cast<double>(n);
     s.worst_head_deg = std::max(s.worst_head_deg, error);
   }
   int active = 0;
@@ -143,8 +145,8 @@ Score score(const std::vector<MaskFrame>& masks, const Truth& truth, const Energ
   return s;
 }
 
-constexpr std::array<const char*, 4> kTakes = {"talking_person_b_30fps", "angry_person_a_60fps", "fearful_person_b_30fps",
-                                               "speech_generic_60fps_clean"};
+constexpr std::array<const char*, 4> kTakes = {"talking_person_b_30fps", "angry_person_a_60fps",
+                                               "fearful_person_b_30fps", "speech_generic_60fps_clean"};
 
 // What the tracker is told of the actor's neutral.
 enum class Told { nothing_but_the_whole_take, nothing_live, a_second_of_rest };
@@ -158,12 +160,14 @@ std::vector<Score> scores(const std::filesystem::path& data, Told told) {
     Tracker tracker(options);
     if (told == Told::nothing_but_the_whole_take) tracker.setNeutral(neutralFromTake(recording.frames, options));
     if (told == Told::a_second_of_rest)
-      tracker.setNeutral(neutralFromRest(capture::readOpenFaceCsv(takes / (take + ".neutral.openface.csv")).frames, options));
+      tracker.setNeutral(
+          neutralFromRest(capture::readOpenFaceCsv(takes / (take + ".neutral.openface.csv")).frames, options));
     std::vector<MaskFrame> masks(recording.frames.size());
     for (std::size_t i = 0; i < masks.size(); ++i) tracker.push(recording.frames[i], masks[i]);
     all.push_back(score(masks, readTruth(takes / (take + ".truth.csv")), faceEnergy(data)));
     const Score& s = all.back();
-    std::printf("%-28s face error %.3f  correlation %.2f  head %.2f deg\n", take.c_str(), s.face_error, s.correlation, s.worst_head_deg);
+    std::printf("%-28s face error %.3f  correlation %.2f  head %.2f deg\n", take.c_str(), s.face_error, s.correlation,
+                s.worst_head_deg);
   }
   return all;
 }

@@ -1,9 +1,9 @@
 #include "tracker/head_pose.h"
 
-#include <gtest/gtest.h>
+#include <cmath>
 
 #include <Eigen/Geometry>
-#include <cmath>
+#include <gtest/gtest.h>
 
 namespace volto::tracker {
 namespace {

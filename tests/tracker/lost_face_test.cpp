@@ -1,9 +1,9 @@
 // What the tracker does without a face, and with points that are none.
-#include <gtest/gtest.h>
-
 #include <cmath>
 #include <limits>
 #include <random>
+
+#include <gtest/gtest.h>
 
 #include "tests/tracker/synthetic_actor.h"
 #include "tracker/tracker.h"
@@ -136,9 +136,15 @@ TEST(TrackerGarbage, NothingMakesTheOutputInfinite) {
         for (auto& p : frame.points_px) p = {320, 240};  // all in one place
         for (auto& p : frame.points_camera_mm) p = {0, 0, 0};
         break;
-      case 2: frame.points_px[random() % 68] = {NAN, INFINITY}; break;
-      case 3: frame.focal_length_px = -1; frame.image_width_px = frame.image_height_px = 0; break;
-      default: break;
+      case 2:
+        frame.points_px[random() % 68] = {NAN, INFINITY};
+        break;
+      case 3:
+        frame.focal_length_px = -1;
+        frame.image_width_px = frame.image_height_px = 0;
+        break;
+      default:
+        break;
     }
     tracker.push(frame, mask);
     ASSERT_TRUE(test::allFinite(mask)) << "frame " << i;

@@ -1,9 +1,9 @@
 #include "tracker/one_euro.h"
 
-#include <gtest/gtest.h>
-
 #include <cmath>
 #include <random>
+
+#include <gtest/gtest.h>
 
 namespace volto::tracker {
 namespace {

@@ -56,16 +56,20 @@ LandmarkFrame SyntheticActor::frame(double time_s, const ArkitWeights& weights, 
   for (std::size_t i = 0; i < kFeaturePointCount; ++i) {
     if (points[i].ibug68[0] < 0 || points[i].ibug68[1] >= 0) continue;
     Eigen::Vector3d at = neutral_mm_.row(static_cast<Eigen::Index>(i)).transpose();
-    for (int c = 0; c < 3; ++c) at[c] += moved[i][static_cast<std::size_t>(c)] * scale_mm_(static_cast<Eigen::Index>(i), c);
+    for (int c = 0; c < 3; ++c)
+      at[c] += moved[i][static_cast<std::size_t>(c)] * scale_mm_(static_cast<Eigen::Index>(i), c);
     const Eigen::Vector3d turned = rotation * at;
     const Eigen::Vector3d in_camera = head.at_mm + Eigen::Vector3d(turned.x(), -turned.y(), -turned.z());
     const auto k = static_cast<std::size_t>(points[i].ibug68[0]);
-    camera[k] = {static_cast<float>(in_camera.x()), static_cast<float>(in_camera.y()), static_cast<float>(in_camera.z())};
-    out.points_px[k] = {static_cast<float>(320 + kFocal_px * in_camera.x() / in_camera.z() + noise_px_ * noise(random_)),
-                        static_cast<float>(240 + kFocal_px * in_camera.y() / in_camera.z() + noise_px_ * noise(random_))};
+    camera[k] = {static_cast<float>(in_camera.x()), static_cast<float>(in_camera.y()),
+                 static_cast<float>(in_camera.z())};
+    out.points_px[k] = {
+        static_cast<float>(320 + kFocal_px * in_camera.x() / in_camera.z() + noise_px_ * noise(random_)),
+        static_cast<float>(240 + kFocal_px * in_camera.y() / in_camera.z() + noise_px_ * noise(random_))};
   }
   for (const std::size_t k : {2U, 5U, 11U, 14U})  // points of the jaw line that no feature point lies on
-    for (std::size_t c = 0; c < 2; ++c) out.points_px[k][c] = 0.5F * (out.points_px[k - 1][c] + out.points_px[k + 1][c]);
+    for (std::size_t c = 0; c < 2; ++c)
+      out.points_px[k][c] = 0.5F * (out.points_px[k - 1][c] + out.points_px[k + 1][c]);
   if (with_3d) out.points_camera_mm = camera;
   return out;
 }
@@ -90,10 +94,14 @@ ArkitWeights expression(std::initializer_list<std::pair<const char*, float>> sha
   return weights;
 }
 
-float weightOf(const MaskFrame& mask, const char* shape) { return mask.arkit_weights[arkitBlendshapeIndex(shape).value()]; }
+float weightOf(const MaskFrame& mask, const char* shape) {
+  return mask.arkit_weights[arkitBlendshapeIndex(shape).value()];
+}
 
 ArkitWeights livelyTalk(double t) {
-  const auto wave = [t](double hz, double phase) { return static_cast<float>(std::max(0.0, std::sin(2 * std::numbers::pi * (hz * t + phase)))); };
+  const auto wave = [t](double hz, double phase) {
+    return static_cast<float>(std::max(0.0, std::sin(2 * std::numbers::pi * (hz * t + phase))));
+  };
   const bool talking = std::fmod(t, 4.0) < 2.8;
   const double blink = std::fmod(t + 0.7, 2.3);
   const float closed = blink < 0.2 ? static_cast<float>(std::sin(std::numbers::pi * blink / 0.2)) : 0.0F;
@@ -120,8 +128,8 @@ HeadMotion livelyHead(double t) {
 }
 
 bool allFinite(const MaskFrame& mask) {
-  bool finite = std::isfinite(mask.confidence) && std::isfinite(mask.head.yaw_rad) && std::isfinite(mask.head.pitch_rad) &&
-                std::isfinite(mask.head.roll_rad);
+  bool finite = std::isfinite(mask.confidence) && std::isfinite(mask.head.yaw_rad) &&
+                std::isfinite(mask.head.pitch_rad) && std::isfinite(mask.head.roll_rad);
   for (const auto& d : mask.displacement_fapu)
     for (const float v : d) finite = finite && std::isfinite(v);
   for (const float v : mask.arkit_weights) finite = finite && std::isfinite(v) && v >= 0 && v <= 1;

@@ -1,10 +1,11 @@
-// An actor with known truth: a face with proportions of its own, expressions from the table, a camera, and noise. Made apart from the
-// tracker's model of a face: another neutral, another focal length, and its own projection.
+// An actor with known truth: a face with proportions of its own, expressions from the table, a camera, and noise. Made
+// apart from the tracker's model of a face: another neutral, another focal length, and its own projection.
 #pragma once
 
-#include <Eigen/Core>
 #include <random>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "frames/landmark_frame.h"
 #include "frames/mask_frame.h"

@@ -1,8 +1,8 @@
 // The data that travel with the tracker: layouts, mean face, statistics of expressions, and what follows from them.
-#include <gtest/gtest.h>
+#include <set>
 
 #include <Eigen/Cholesky>
-#include <set>
+#include <gtest/gtest.h>
 
 #include "tracker/expression_prior.h"
 #include "tracker/landmark_layout.h"
@@ -49,8 +49,10 @@ TEST(MeanFace, IsExactlySymmetric) {
 }
 
 TEST(MeanFace, ATornFileIsRefusedWithItsLine) {
-  EXPECT_NE(errorOf([] { parseMeanFace("feature_point,x,y,z\n2.1,0,1\n", "f.csv"); }).find("f.csv:2"), std::string::npos);
-  EXPECT_NE(errorOf([] { parseMeanFace("feature_point,x,y,z\n2.1,0,nan,0\n", "f.csv"); }).find("nan"), std::string::npos);
+  EXPECT_NE(errorOf([] { parseMeanFace("feature_point,x,y,z\n2.1,0,1\n", "f.csv"); }).find("f.csv:2"),
+            std::string::npos);
+  EXPECT_NE(errorOf([] { parseMeanFace("feature_point,x,y,z\n2.1,0,nan,0\n", "f.csv"); }).find("nan"),
+            std::string::npos);
   EXPECT_NE(errorOf([] { parseMeanFace("feature_point,x,y,z\n2.1,0,1,2\n", "f.csv"); }).find("84"), std::string::npos);
   EXPECT_NE(errorOf([] { parseMeanFace("", "f.csv"); }).find("f.csv"), std::string::npos);
 }
@@ -66,12 +68,14 @@ TEST(ExpressionStatistics, LeftAndRightAreUsedAlike) {
   const ShapeMatrix moment = ExpressionPrior::standard().secondMoment(0.5);
   for (std::size_t k = 0; k < kArkitBlendshapeCount; ++k) {
     const auto m = static_cast<Eigen::Index>(arkitMirrorIndex(k));
-    EXPECT_NEAR(moment(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(k)), moment(m, m), 1e-9) << kArkitBlendshapeNames[k];
+    EXPECT_NEAR(moment(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(k)), moment(m, m), 1e-9)
+        << kArkitBlendshapeNames[k];
   }
 }
 
 TEST(ExpressionStatistics, AFileOfOtherShapesIsRefused) {
-  EXPECT_NE(errorOf([] { ExpressionPrior::parse("shape,rms\nsmile,0.1\n", "p.csv"); }).find("p.csv:2"), std::string::npos);
+  EXPECT_NE(errorOf([] { ExpressionPrior::parse("shape,rms\nsmile,0.1\n", "p.csv"); }).find("p.csv:2"),
+            std::string::npos);
   EXPECT_NE(errorOf([] { ExpressionPrior::parse("", "p.csv"); }).find("52"), std::string::npos);
 }
 
@@ -86,7 +90,8 @@ TEST(Observability, WhatSixtyEightPointsCannotShowIsNotReported) {
 
 TEST(Observability, DepthShowsTheJawComingForward) {
   const MeasuredPoints points = measuredPoints(layoutTable(LandmarkLayout::ibug68));
-  EXPECT_TRUE(observableShapes(points, rig::ExpressionTable::standard(), true)[arkitBlendshapeIndex("jawForward").value()]);
+  EXPECT_TRUE(
+      observableShapes(points, rig::ExpressionTable::standard(), true)[arkitBlendshapeIndex("jawForward").value()]);
 }
 
 }  // namespace

@@ -1,11 +1,11 @@
 #include "tracker/tracker.h"
 
-#include <gtest/gtest.h>
-
 #include <cmath>
 #include <cstring>
 #include <numbers>
 #include <stdexcept>
+
+#include <gtest/gtest.h>
 
 #include "tests/tracker/synthetic_actor.h"
 
@@ -29,7 +29,8 @@ class KnownActor : public ::testing::Test {
   }
 
   void show(const ArkitWeights& weights, const HeadMotion& head = {}, double seconds = kFrame_s) {
-    for (double end = time_s + seconds; time_s < end - 1e-9; time_s += kFrame_s) tracker.push(actor.frame(time_s, weights, head), mask);
+    for (double end = time_s + seconds; time_s < end - 1e-9; time_s += kFrame_s)
+      tracker.push(actor.frame(time_s, weights, head), mask);
   }
 
   static constexpr TrackerOptions options{.use_3d = false};
@@ -53,7 +54,8 @@ TEST_F(KnownActor, SmileGivesSmile) {
 
 TEST_F(KnownActor, RestIsNeutral) {
   show({}, {}, 1);
-  for (std::size_t k = 0; k < kArkitBlendshapeCount; ++k) EXPECT_LT(mask.arkit_weights[k], 0.2) << kArkitBlendshapeNames[k];
+  for (std::size_t k = 0; k < kArkitBlendshapeCount; ++k)
+    EXPECT_LT(mask.arkit_weights[k], 0.2) << kArkitBlendshapeNames[k];
 }
 
 TEST_F(KnownActor, OneEyeCanBlinkAlone) {
@@ -136,7 +138,8 @@ TEST_F(KnownActor, AFewPointsGoneAstrayDoNotMoveTheFace) {
 TEST_F(KnownActor, ThreeDimensionsGiveTheTrueDistance) {
   SyntheticActor other(5, 0.0);
   Tracker tracker3d;
-  for (int i = 0; i < 60; ++i) tracker3d.push(other.frame(i * kFrame_s, test::livelyTalk(i * kFrame_s), {}, true), mask);
+  for (int i = 0; i < 60; ++i)
+    tracker3d.push(other.frame(i * kFrame_s, test::livelyTalk(i * kFrame_s), {}, true), mask);
   EXPECT_NEAR(mask.head.translation_mm[2], 650, 15);
   EXPECT_TRUE(mask.arkit_observed[arkitBlendshapeIndex("jawForward").value()]);
 }
@@ -147,13 +150,15 @@ TEST(TrackerNeutral, IsFoundThoughTheTakeBeginsWithASmile) {
   std::vector<ArkitWeights> truth;
   for (int i = 0; i < 900; ++i) {
     const double t = i / 30.0;
-    truth.push_back(t < 2 ? expression({{"mouthSmileLeft", 0.7F}, {"mouthSmileRight", 0.7F}, {"jawOpen", 0.2F}}) : test::livelyTalk(t));
+    truth.push_back(t < 2 ? expression({{"mouthSmileLeft", 0.7F}, {"mouthSmileRight", 0.7F}, {"jawOpen", 0.2F}})
+                          : test::livelyTalk(t));
     take.push_back(actor.frame(t, truth.back(), test::livelyHead(t)));
   }
   const TrackerOptions options{.use_3d = false};
   const auto errors = [&](Tracker& tracker, std::size_t from) {
     MaskFrame mask;
-    const std::size_t smile = arkitBlendshapeIndex("mouthSmileLeft").value(), jaw = arkitBlendshapeIndex("jawOpen").value();
+    const std::size_t smile = arkitBlendshapeIndex("mouthSmileLeft").value(),
+                      jaw = arkitBlendshapeIndex("jawOpen").value();
     std::array<double, 2> sum{};
     for (std::size_t i = 0; i < take.size(); ++i) {
       tracker.push(take[i], mask);
@@ -212,7 +217,8 @@ TEST(TrackerLayouts, SixtySixPointsTrackToo) {
   MaskFrame mask;
   HeadMotion head;
   head.yaw_deg = 10;
-  for (int i = 0; i < 120; ++i) tracker.push(actor.frame66(i * kFrame_s, expression({{"jawOpen", i < 60 ? 0.0F : 0.5F}}), head), mask);
+  for (int i = 0; i < 120; ++i)
+    tracker.push(actor.frame66(i * kFrame_s, expression({{"jawOpen", i < 60 ? 0.0F : 0.5F}}), head), mask);
   EXPECT_EQ(mask.state, TrackingState::tracking);
   EXPECT_GT(weightOf(mask, "jawOpen"), 0.3);
   EXPECT_NEAR(mask.head.yaw_rad * 180 / std::numbers::pi, 10, 3);
@@ -234,7 +240,8 @@ TEST(TrackerReplay, IsTheSameToTheBit) {
     MaskFrame first, second;
     one.push(a.frame(t, test::livelyTalk(t), test::livelyHead(t)), first);
     two.push(b.frame(t, test::livelyTalk(t), test::livelyHead(t)), second);
-    ASSERT_EQ(std::memcmp(&first.displacement_fapu, &second.displacement_fapu, sizeof first.displacement_fapu), 0) << "frame " << i;
+    ASSERT_EQ(std::memcmp(&first.displacement_fapu, &second.displacement_fapu, sizeof first.displacement_fapu), 0)
+        << "frame " << i;
     ASSERT_EQ(std::memcmp(&first.arkit_weights, &second.arkit_weights, sizeof first.arkit_weights), 0) << "frame " << i;
     ASSERT_EQ(std::memcmp(&first.head.rotation, &second.head.rotation, sizeof first.head.rotation), 0) << "frame " << i;
   }
