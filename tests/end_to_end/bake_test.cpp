@@ -62,6 +62,29 @@ TEST_F(Bake, ContactSheetIsOnePicture) {
   EXPECT_EQ(readFile(path("sheet.png")).substr(1, 3), "PNG");
 }
 
+TEST_F(Bake, AnimationHoldsTheFramesOfTheStretchAskedFor) {
+  const std::string input = performance(60);  // at 60 a second
+  const Finished run = volto({"bake", input, "--rig", rig(), "--png", path("moves.png"), "--animate", "--size", "48",
+                              "--every", "2", "--from", "0.2", "--to", "0.5"});
+  ASSERT_EQ(run.status, 0) << run.err;
+  const std::string bytes = readFile(path("moves.png"));
+  const std::size_t control = bytes.find("acTL");
+  ASSERT_NE(control, std::string::npos);
+  // acTL: number of frames, big-endian. Frames 12, 14 .. 30 lie in the stretch.
+  EXPECT_EQ(bytes.substr(control + 4, 4), std::string("\0\0\0\x0A", 4));
+}
+
+TEST_F(Bake, StretchWithoutAFrameIsWrongUsage) {
+  const Finished run = volto({"bake", performance(10), "--rig", rig(), "--csv", path("w.csv"), "--from", "7"});
+  EXPECT_EQ(run.status, 2);
+  EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
+  EXPECT_FALSE(std::filesystem::exists(path("w.csv")));
+}
+
+TEST_F(Bake, AnimationWithoutAPictureIsWrongUsage) {
+  EXPECT_EQ(volto({"bake", performance(10), "--rig", rig(), "--csv", path("w.csv"), "--animate"}).status, 2);
+}
+
 TEST_F(Bake, EveryNthRowIsTheRowOfTheWholeBake) {
   const std::string input = performance(21);
   ASSERT_EQ(volto({"bake", input, "--rig", rig(), "--csv", path("all.csv")}).status, 0);

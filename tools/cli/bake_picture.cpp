@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cstdio>
 #include <limits>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "tools/cli/exit_status.h"
 #include "tools/cli/output_file.h"
 #include "tools/picture/contact_sheet.h"
 #include "tools/picture/head_renderer.h"
@@ -17,7 +19,8 @@ namespace volto::cli {
 namespace {
 
 constexpr std::size_t kSheetColumns = 4, kSheetRows = 3;
-constexpr int kTile_px = 320, kFrame_px = 512;
+constexpr int kTile_px = 320, kFrame_px = 512, kAnimation_px = 288;
+constexpr std::size_t kMostAnimationFrames = 1500;  // they are held in memory, and nobody loads more
 
 picture::ViewOptions viewNamed(const std::string& name, int size_px, const rig::Rig& rig) {
   picture::ViewOptions view = name == "side"            ? picture::sideView(size_px)
@@ -52,8 +55,9 @@ struct PictureBaker::State {
         renderer(rig.neutral, picture::lookOfRig(rig)),
         expected(std::max<std::size_t>(frames, 1)),
         moments(std::min(expected, kSheetColumns * kSheetRows)) {
-    options.sheet = options.sheet || options.path.extension() == ".png";
-    view = viewNamed(options.view, options.sheet ? kTile_px : kFrame_px, rig);
+    options.sheet = !options.animate && (options.sheet || options.path.extension() == ".png");
+    const int usual_px = options.sheet ? kTile_px : options.animate ? kAnimation_px : kFrame_px;
+    view = viewNamed(options.view, options.size_px > 0 ? options.size_px : usual_px, rig);
     for (const rig::Blendshape& shape : rig.blendshapes) {
       const auto index = arkitBlendshapeIndex(shape.name);
       const std::string_view name = index ? kArkitBlendshapeNames[*index] : std::string_view(shape.name);
@@ -80,11 +84,18 @@ struct PictureBaker::State {
   std::size_t expected;
   std::size_t seen = 0;
   std::vector<Moment> moments;  // of a sheet: the liveliest frame of each stretch of the performance
+  std::vector<picture::Picture> animation;
+  std::int64_t animation_start_ns = 0, animation_end_ns = 0;
 };
 
 PictureBaker::PictureBaker(const PictureOptions& options, const rig::Rig& rig, std::size_t frames)
     : state_(std::make_unique<State>(options, rig, frames)) {
-  if (state_->options.sheet) {
+  if (options.animate && frames > kMostAnimationFrames) {
+    throw CommandError(kWrongUsage, "an animation of " + std::to_string(frames) + " frames is too long, " +
+                                        std::to_string(kMostAnimationFrames) +
+                                        " is the most; use --every, --from and --to");
+  }
+  if (state_->options.sheet || options.animate) {
     requireReplaceable(options.path);
   } else {
     makeOutputFolder(options.path);
@@ -95,6 +106,12 @@ PictureBaker::~PictureBaker() = default;
 
 void PictureBaker::frame(std::size_t number, std::int64_t t_ns, const AvatarFrame& avatar) {
   State& s = *state_;
+  if (s.options.animate) {
+    if (s.animation.empty()) s.animation_start_ns = t_ns;
+    s.animation_end_ns = t_ns;
+    s.animation.push_back(s.render(avatar.head, avatar.vertices));
+    return;
+  }
   if (!s.options.sheet) {
     picture::writePng(s.options.path / frameFileName(number, ".png"), s.render(avatar.head, avatar.vertices));
     return;
@@ -108,6 +125,12 @@ void PictureBaker::frame(std::size_t number, std::int64_t t_ns, const AvatarFram
 
 void PictureBaker::finish() {
   State& s = *state_;
+  if (s.options.animate) {
+    const double seconds = static_cast<double>(s.animation_end_ns - s.animation_start_ns) * 1e-9;
+    const double fps = seconds > 0 ? static_cast<double>(s.animation.size() - 1) / seconds : 1.0;
+    picture::writeApng(s.options.path, s.animation, std::clamp(fps, 0.1, 1000.0));
+    return;
+  }
   if (!s.options.sheet) return;
   std::vector<picture::Cell> cells;
   for (const State::Moment& moment : s.moments) {

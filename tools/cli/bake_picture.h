@@ -1,4 +1,4 @@
-// Pictures of a baked performance: one per frame, or one sheet of several moments.
+// Pictures of a baked performance: one per frame, one sheet of several moments, or one that moves.
 #pragma once
 
 #include <cstddef>
@@ -19,6 +19,8 @@ struct PictureOptions {
   std::filesystem::path path;  // a folder, or the sheet's file
   std::string view = "front";  // front, three-quarter, side
   bool sheet = false;          // also when the path ends in .png
+  bool animate = false;        // one animated PNG of all frames
+  int size_px = 0;             // width and height of a picture, or of a tile of the sheet; 0: what suits it
 };
 
 class PictureBaker {
@@ -30,7 +32,7 @@ class PictureBaker {
 
   // `number` names the file; frames come in order.
   void frame(std::size_t number, std::int64_t t_ns, const AvatarFrame& avatar);
-  // Writes the sheet.
+  // Writes the sheet or the animation.
   void finish();
 
  private:

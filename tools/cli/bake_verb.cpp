@@ -32,6 +32,10 @@ struct Options {
   std::string view = "front";
   std::size_t every = 1;
   bool sheet = false;
+  bool animate = false;
+  int size_px = 0;
+  double from_s = 0;
+  double to_s = 0;  // 0: to the end
   TrackingFlags tracking;
 };
 
@@ -91,7 +95,7 @@ class CsvSink : public Sink {
 class PngSink : public Sink {
  public:
   PngSink(const Options& options, const rig::Rig& rig, std::size_t frames)
-      : baker_({options.png, options.view, options.sheet}, rig, frames) {}
+      : baker_({options.png, options.view, options.sheet, options.animate, options.size_px}, rig, frames) {}
   void frame(std::size_t number, const AvatarFrame& avatar, std::int64_t t_ns) override {
     baker_.frame(number, t_ns, avatar);
   }
@@ -101,7 +105,20 @@ class PngSink : public Sink {
   PictureBaker baker_;
 };
 
+// Every Nth frame of the stretch that was asked for, counted from the start of the performance.
+std::vector<std::size_t> framesToWrite(const pipeline::Performance& performance, const Options& options) {
+  std::vector<std::size_t> frames;
+  for (std::size_t frame = 0; frame < performance.frameCount(); frame += options.every) {
+    const double t_s = static_cast<double>(performance.time(frame) - performance.time(0)) * 1e-9;
+    if (t_s >= options.from_s && (options.to_s <= 0 || t_s <= options.to_s)) frames.push_back(frame);
+  }
+  return frames;
+}
+
 int run(const Options& options) {
+  if (options.animate && (options.png.empty() || options.sheet)) {
+    throw CommandError(kWrongUsage, "--animate makes one moving picture of --png F; it needs --png and no --sheet");
+  }
   if (options.obj.empty() && options.csv.empty() && options.png.empty()) {
     throw CommandError(kWrongUsage, "say what to make: --obj DIR, --csv F or --png F; see volto help bake");
   }
@@ -116,18 +133,20 @@ int run(const Options& options) {
   const bool mesh = !options.obj.empty() || !options.png.empty();
   pipeline::FramePath path(rig, trackingOptions(options.tracking, performance), {.mesh = mesh, .weights = true});
 
-  const std::size_t count = (performance.frameCount() + options.every - 1) / options.every;
+  const std::vector<std::size_t> wanted = framesToWrite(performance, options);
+  if (wanted.empty()) throw CommandError(kWrongUsage, "no frame lies between --from and --to");
   std::vector<std::unique_ptr<Sink>> sinks;
   if (!options.obj.empty()) sinks.push_back(std::make_unique<ObjSink>(options.obj, rig.neutral));
   if (!options.csv.empty()) sinks.push_back(std::make_unique<CsvSink>(options.csv, rig));
-  if (!options.png.empty()) sinks.push_back(std::make_unique<PngSink>(options, rig, count));
+  if (!options.png.empty()) sinks.push_back(std::make_unique<PngSink>(options, rig, wanted.size()));
 
-  Progress progress("baking frame", performance.frameCount());
-  for (std::size_t frame = 0; frame < performance.frameCount(); ++frame) {
+  Progress progress("baking frame", wanted.back() + 1);
+  std::size_t next = 0;
+  for (std::size_t frame = 0; frame <= wanted.back(); ++frame) {
     if (stopRequested()) throw CommandError(kFailed, "stopped before the end; what is not complete was not written");
-    path.push(performance,
-              frame);  // every frame, also those that are not written: filters and warm starts depend on it
-    if (frame % options.every != 0) continue;
+    path.push(performance, frame);  // also those that are not written: filters and warm starts depend on them
+    if (frame != wanted[next]) continue;
+    ++next;
     for (const auto& sink : sinks) sink->frame(frame, path.avatar(), performance.time(frame));
     progress.show(frame);
   }
@@ -163,6 +182,17 @@ RunVerb defineBake(CLI::App& app) {
       ->check(CLI::IsMember({"front", "three-quarter", "side"}));
   app.add_flag("--sheet", options->sheet,
                "--png makes one contact sheet of several moments, spread over the performance");
+  app.add_flag("--animate", options->animate, "--png makes one animated PNG (APNG) of all frames written");
+  app.add_option("--size", options->size_px,
+                 "width and height of a picture (default 512; tile of a sheet 320, animation 288)")
+      ->type_name("PX")
+      ->check(CLI::Range(16, 4096));
+  app.add_option("--from", options->from_s, "write from this second of the performance on (default 0)")
+      ->type_name("S")
+      ->check(CLI::Range(0.0, 1e6));
+  app.add_option("--to", options->to_s, "write up to this second (default: the end)")
+      ->type_name("S")
+      ->check(CLI::Range(0.0, 1e6));
   addTrackingFlags(app, options->tracking);
   return [options] { return run(*options); };
 }
