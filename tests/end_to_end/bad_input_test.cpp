@@ -176,8 +176,9 @@ class BadPoints : public World {
  protected:
   Json points() const { return Json::parse(readFile(headPoints())); }
   void expectPointsRefused(const std::string& json, const std::string& said) const {
-    expectRefused(volto({"rig", headMesh(), "--points", write("p.json", json), "-o", output("c.rig")}), 65, "rig",
-                  said);
+    const Finished run = volto({"rig", headMesh(), "--points", write("p.json", json), "-o", output("c.rig")});
+    expectRefused(run, 65, "rig", said);
+    EXPECT_NE(run.err.find("p.json"), std::string::npos) << run.err;  // which of the two files is at fault
   }
 };
 
@@ -211,7 +212,7 @@ TEST_F(BadPoints, OutOfRange) {
 TEST_F(BadPoints, AllInOnePlace) {
   Json json = points();
   for (auto& point : json["feature_points"]) point = {1.0, 2.0, 3.0};
-  expectPointsRefused(json.dump(), "p");
+  expectPointsRefused(json.dump(), "in one place");
 }
 
 TEST_F(BadPoints, NotJsonOrNotPoints) {

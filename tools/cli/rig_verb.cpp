@@ -45,7 +45,13 @@ int run(const Options& options) {
   const std::filesystem::path mesh_path(options.mesh);
   rig::RigOptions rig_options;
   rig_options.name = options.name.empty() ? mesh_path.stem().string() : options.name;
-  rig::Rig character = rig::buildRig(mesh, choices, rig_options);
+  rig::Rig character = [&] {
+    try {
+      return rig::buildRig(mesh, choices, rig_options);
+    } catch (const rig::InputError& error) {  // it knows points and vertices, not the files they came from
+      throw rig::InputError(options.points + " on " + options.mesh + ": " + error.what());
+    }
+  }();
   character.mesh_file = mesh_path.filename().string();
   for (const std::string& substitution : character.fapu.substitutions) {
     std::fprintf(stderr, "volto rig: note: %s: %s\n", options.mesh.c_str(), substitution.c_str());
