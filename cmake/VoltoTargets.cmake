@@ -38,3 +38,13 @@ function(volto_test name)
   target_link_libraries(${name}_test PRIVATE ${ARG_LINK} volto_test_support GTest::gtest_main volto_build_options)
   gtest_discover_tests(${name}_test TEST_PREFIX "${name}/" DISCOVERY_TIMEOUT 60 PROPERTIES LABELS ${name} TIMEOUT 120)
 endfunction()
+
+# volto_fuzz_replay(FOLDER TARGET volto::rig): runs tests/fuzz/TARGET_fuzz.cpp on its corpus, whole and cut, as the plain test FOLDER/fuzz/TARGET;
+# tests/fuzz runs the same with libFuzzer.
+function(volto_fuzz_replay folder target library)
+  add_executable(volto_${target}_replay ${PROJECT_SOURCE_DIR}/tests/fuzz/${target}_fuzz.cpp
+                 ${PROJECT_SOURCE_DIR}/tests/fuzz/replay_main.cpp)
+  target_link_libraries(volto_${target}_replay PRIVATE ${library} volto_build_options)
+  add_test(NAME ${folder}/fuzz/${target} COMMAND volto_${target}_replay ${PROJECT_SOURCE_DIR}/tests/fuzz/corpus/${target})
+  set_tests_properties(${folder}/fuzz/${target} PROPERTIES LABELS ${folder} TIMEOUT 120)
+endfunction()
