@@ -57,47 +57,9 @@ std::string materialName(Material material) {
   return "skin";
 }
 
-std::array<double, 3> materialColour(Material material) {
-  switch (material) {
-    case Material::skin:
-      return {0.72, 0.47, 0.36};
-    case Material::hair:
-      return {0.085, 0.05, 0.036};
-    case Material::lips:
-      return {0.58, 0.24, 0.22};
-    case Material::mouth:
-      return {0.22, 0.06, 0.06};
-    case Material::nostril:
-      return {0.20, 0.08, 0.06};
-    case Material::eye_white:
-      return {0.86, 0.85, 0.83};
-    case Material::iris:
-      return {0.13, 0.28, 0.33};
-    case Material::iris_rim:
-      return {0.04, 0.09, 0.12};
-    case Material::pupil:
-      return {0.01, 0.01, 0.012};
-    case Material::caruncle:
-      return {0.62, 0.33, 0.28};
-    case Material::teeth:
-      return {0.85, 0.82, 0.74};
-    case Material::gums:
-      return {0.52, 0.20, 0.20};
-    case Material::tongue:
-      return {0.55, 0.20, 0.20};
-    case Material::lashes:
-      return {0.03, 0.02, 0.02};
-    case Material::brows:
-      return {0.10, 0.06, 0.045};
-    case Material::count:
-      break;
-  }
-  return {0.8, 0.8, 0.8};
-}
-
 std::string objText(const Head& head, const std::string& mtl_file) {
-  std::string out =
-      "# Volto's head, made by volto-make-head; centimetres, +x the subject's left, +y up, +z out of the face\n";
+  std::string out = "# " + head.character.name +
+                    ", made by volto-make-head; centimetres, +x the subject's left, +y up, +z out of the face\n";
   out += "mtllib " + mtl_file + "\n";
   for (const Vec3& v : head.vertices) {
     out += "v ";
@@ -126,11 +88,11 @@ std::string objText(const Head& head, const std::string& mtl_file) {
   return out;
 }
 
-std::string mtlText() {
-  std::string out = "# Materials of Volto's head\n";
+std::string mtlText(const Character& character) {
+  std::string out = "# Materials of " + character.name + "\n";
   for (std::size_t m = 0; m < static_cast<std::size_t>(Material::count); ++m) {
     out += "newmtl " + materialName(static_cast<Material>(m)) + "\nKd";
-    for (const double c : materialColour(static_cast<Material>(m))) {
+    for (const double c : character.palette[m]) {
       out += ' ';
       appendNumber(out, c, 3);
     }

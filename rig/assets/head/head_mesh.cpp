@@ -155,25 +155,38 @@ void placeFeaturePoints(Head& head, const HalfMesh& skin) {
 
 }  // namespace
 
-Head makeHead() {
+Head makeHead(const Character& character) {
   HalfMesh skin = makeCage();
   relax(skin, 8, 0.5);
   skin = split(skin);
   relax(skin, 8, 0.5);
   skin = split(skin);
   relax(skin, 8, 0.5);
-  raiseHair(skin, 0.24);
+  raiseHair(skin, character.proportions.hair_thickness);
   sinkNostrils(skin);
+  if (character.proportions.hair_thickness == 0)
+    for (Polygon& polygon : skin.polygons)
+      if (polygon.material == Material::hair) polygon.material = Material::skin;
+
+  const Proportions& proportions = character.proportions;
+  HalfMesh reshaped_skin = skin, eyeball = makeEyeball(proportions.iris_size, proportions.pupil_size);
+  HalfMesh upper_teeth = makeUpperTeeth(), lower_teeth = makeLowerTeeth(), tongue = makeTongue();
+  HalfMesh lashes = makeUpperLashes(), brow = makeBrow();
+  reshape(proportions, reshaped_skin);
+  for (HalfMesh* part : {&upper_teeth, &lower_teeth, &tongue, &lashes}) reshape(proportions, *part);
+  reshapeOnSkin(proportions, skin, reshaped_skin, brow);
+  reshapeEyeball(proportions, eyeball);
 
   Head head;
-  append(head, skin, "skin");  // first, so that a vertex of the left half keeps its number
-  append(head, makeEyeball(), "eyeballs");
-  append(head, makeUpperTeeth(), "upper_teeth");
-  append(head, makeLowerTeeth(), "lower_teeth");
-  append(head, makeTongue(), "tongue");
-  append(head, makeUpperLashes(), "lashes");
-  append(head, makeBrow(), "brows");
-  placeFeaturePoints(head, skin);
+  head.character = character;
+  append(head, reshaped_skin, "skin");  // first, so that a vertex of the left half keeps its number
+  append(head, eyeball, "eyeballs");
+  append(head, upper_teeth, "upper_teeth");
+  append(head, lower_teeth, "lower_teeth");
+  append(head, tongue, "tongue");
+  append(head, lashes, "lashes");
+  append(head, brow, "brows");
+  placeFeaturePoints(head, skin);  // found on the adult's form, so the same vertices for every character
   return head;
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "rig/assets/head/character.h"
 #include "rig/assets/head/half_mesh.h"
 
 namespace volto::head {
@@ -18,6 +19,7 @@ struct Component {
 };
 
 struct Head {
+  Character character;
   std::vector<Vec3> vertices;     // centimetres, +x subject's left, +y up, +z out of the face
   std::vector<int> mirror;        // vertex of the other side; itself on the midline
   std::vector<Polygon> polygons;  // grouped by component, counter-clockwise from outside
@@ -26,14 +28,13 @@ struct Head {
   std::vector<std::pair<std::string, int>> feature_points;  // id, vertex: all 84, in the mask's order
 };
 
-Head makeHead();
+Head makeHead(const Character& character = adult());
 
 std::string materialName(Material material);
-std::array<double, 3> materialColour(Material material);  // linear RGB
 
 // The files: numbers with five decimals, no negative zero.
 std::string objText(const Head& head, const std::string& mtl_file);
-std::string mtlText();
+std::string mtlText(const Character& character);
 std::string pointsText(const Head& head);
 
 }  // namespace volto::head

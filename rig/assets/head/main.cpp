@@ -1,4 +1,4 @@
-// volto-make-head DIR: writes volto_head.obj, volto_head.mtl and volto_head.points.json into DIR.
+// volto-make-head DIR: writes the characters volto_head and volto_creature (.obj, .mtl, .points.json) into DIR.
 #include <cstdio>
 #include <exception>
 #include <filesystem>
@@ -14,17 +14,20 @@ int main(int argc, char** argv) {
   }
   try {
     const std::filesystem::path directory = argv[1];
-    const volto::head::Head head = volto::head::makeHead();
-    const auto write = [&](const char* name, const std::string& text) {
+    const auto write = [&](const std::string& name, const std::string& text) {
       std::ofstream file(directory / name, std::ios::binary);
       file << text;
       if (!file.flush())
         throw std::runtime_error((directory / name).string() + ": cannot be written; check the folder");
     };
-    write("volto_head.obj", volto::head::objText(head, "volto_head.mtl"));
-    write("volto_head.mtl", volto::head::mtlText());
-    write("volto_head.points.json", volto::head::pointsText(head));
-    std::cout << head.vertices.size() << " vertices, " << head.polygons.size() << " polygons\n";
+    for (const volto::head::Character& character : {volto::head::adult(), volto::head::creature()}) {
+      const volto::head::Head head = volto::head::makeHead(character);
+      const std::string& name = character.file;
+      write(name + ".obj", volto::head::objText(head, name + ".mtl"));
+      write(name + ".mtl", volto::head::mtlText(character));
+      write(name + ".points.json", volto::head::pointsText(head));
+      std::cout << name << ": " << head.vertices.size() << " vertices, " << head.polygons.size() << " polygons\n";
+    }
   } catch (const std::exception& error) {
     std::cerr << "volto-make-head: " << error.what() << '\n';
     return 1;

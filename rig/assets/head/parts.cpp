@@ -125,23 +125,23 @@ HalfMesh makeTeeth(const Arch& arch, double width_scale) {
 
 }  // namespace
 
-HalfMesh makeEyeball() {
+HalfMesh makeEyeball(double iris_size, double pupil_size) {
   HalfMesh mesh;
   constexpr int kAround = 28;
   // Distance from the axis of each ring's edge (iris), then angle for the white.
-  constexpr double kPupil = 0.23, kIris = 0.60, kIrisRim = 0.665;
+  const double pupil = 0.23 * pupil_size, iris = 0.60 * iris_size, iris_rim = 0.665 * iris_size;
   std::vector<double> angles;
   std::vector<Material> materials;  // of the band that ends at the angle of the same place
   const auto ringAt = [&](double radius, Material m) {
     angles.push_back(std::asin(radius / kEyeRadius));
     materials.push_back(m);
   };
-  ringAt(kPupil * 0.5, Material::pupil);
-  ringAt(kPupil, Material::pupil);
-  ringAt(lerp(kPupil, kIris, 0.33), Material::iris);
-  ringAt(lerp(kPupil, kIris, 0.67), Material::iris);
-  ringAt(kIris, Material::iris);
-  ringAt(kIrisRim, Material::iris_rim);
+  ringAt(pupil * 0.5, Material::pupil);
+  ringAt(pupil, Material::pupil);
+  ringAt(lerp(pupil, iris, 0.33), Material::iris);
+  ringAt(lerp(pupil, iris, 0.67), Material::iris);
+  ringAt(iris, Material::iris);
+  ringAt(iris_rim, Material::iris_rim);
   const double start = angles.back();
   for (int i = 1; i <= 8; ++i) {
     angles.push_back(lerp(start, kPi * 0.97, i / 8.0));

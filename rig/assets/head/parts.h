@@ -6,7 +6,7 @@
 namespace volto::head {
 
 // Left half of each part; a part on the midline has its midline vertices marked, the others stand wholly on the left.
-HalfMesh makeEyeball();
+HalfMesh makeEyeball(double iris_size = 1, double pupil_size = 1);  // sizes: of the adult's
 HalfMesh makeUpperTeeth();
 HalfMesh makeLowerTeeth();
 HalfMesh makeTongue();

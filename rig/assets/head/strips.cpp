@@ -123,14 +123,10 @@ constexpr double kOutlineA[12] = {-0.80, -0.72, -0.40, 0.50, 1.55, 2.10, 2.06, 1
 constexpr double kOutlineB[12] = {-0.25, 1.05, 2.25, 2.95, 2.62, 1.60, 0.20, -1.10, -2.15, -2.85, -2.62, -1.55};
 
 Vec3 earPoint(double ring, double around) {
-  const double flare = 0.33, tilt = 0.16;  // radians: out from the skull, and backward
-  const double cf = std::cos(flare), sf = std::sin(flare), ct = std::cos(tilt), st = std::sin(tilt);
-  const Vec3 back0{sf, 0, -cf}, out{cf, 0, sf}, up0{0, 1, 0};
-  const Vec3 back = back0 * ct - up0 * st, up = up0 * ct + back0 * st;
-  const Vec3 origin{6.35, -1.65, 0.45};
+  const auto [origin, back, up, out] = earFrame();
   const double oa = wrappedSpline(kOutlineA, around), ob = wrappedSpline(kOutlineB, around);
   // The lobe leans in to the head.
-  const auto at = [&](double a, double b, double h) {
+  const auto at = [origin = origin, back = back, up = up, out = out](double a, double b, double h) {
     return origin + back * a + up * b + out * (h - 0.38 * smoothstep(-0.8, -2.8, b));
   };
 
@@ -176,6 +172,13 @@ int stripPeriod(Strip strip) {
     default:
       return 0;
   }
+}
+
+EarFrame earFrame() {
+  const double flare = 0.33, tilt = 0.16;  // radians: out from the skull, and backward
+  const double cf = std::cos(flare), sf = std::sin(flare), ct = std::cos(tilt), st = std::sin(tilt);
+  const Vec3 back{sf, 0, -cf}, up{0, 1, 0};
+  return {{6.35, -1.65, 0.45}, back * ct - up * st, up * ct + back * st, {cf, 0, sf}};
 }
 
 Vec3 lidMargin(double around) { return eyePoint(kLidMarginFront, around); }

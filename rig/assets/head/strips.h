@@ -24,6 +24,12 @@ inline constexpr int kEarAround = 12;
 Vec3 stripPoint(Strip strip, double ring, double around);
 int stripPeriod(Strip strip);  // 0: not closed
 
+// The ear's own directions (unit length, at right angles) and the middle of its root.
+struct EarFrame {
+  Vec3 origin, back, up, out;
+};
+EarFrame earFrame();
+
 // Where the lid margin's outer edge is, and the line where the closed lips meet (left half: corner at around 5).
 Vec3 lidMargin(double around);
 
