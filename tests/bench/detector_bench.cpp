@@ -1,4 +1,5 @@
 // Everything but decoding and network, as a part of one landmark inference: PFLD, 112 x 112, by OpenCV's dnn module.
+#include <filesystem>
 #include <opencv2/dnn.hpp>
 
 #include <benchmark/benchmark.h>

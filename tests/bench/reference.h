@@ -1,6 +1,6 @@
-// The straightforward ways that Volto is measured against, written well and compiled for this very machine
-// (-march=native), in a shared library of their own so that nothing of it leaks into Volto's code. Plain pointers in
-// and out; floats unless said.
+// The straightforward ways that Volto is measured against, written well and compiled with the flags of the library (or
+// for this very machine: VOLTO_BENCH_NATIVE), in a shared library of their own so that nothing of it leaks into Volto's
+// code. Plain pointers in and out; floats unless said.
 #pragma once
 
 #include <array>
