@@ -31,6 +31,11 @@ function(volto_library name)
   install(FILES ${headers} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/volto/${name})
 endfunction()
 
+set(VOLTO_TEST_TIMEOUT_S 120)
+if(VOLTO_SANITIZE)
+  set(VOLTO_TEST_TIMEOUT_S 900)  # many times slower, and slower again on a busy machine
+endif()
+
 # volto_test(NAME SOURCES a_test.cpp ... LINK volto::rig): one GoogleTest executable per folder; ctest names are FOLDER/Suite.Finding.
 function(volto_test name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
@@ -38,7 +43,7 @@ function(volto_test name)
   target_link_libraries(${name}_test PRIVATE ${ARG_LINK} volto_test_support GTest::gtest_main volto_build_options)
   # The libraries are what people run; the tests themselves need to be built quickly.
   target_compile_options(${name}_test PRIVATE $<$<CONFIG:Release>:-O1>)
-  gtest_discover_tests(${name}_test TEST_PREFIX "${name}/" DISCOVERY_TIMEOUT 60 PROPERTIES LABELS ${name} TIMEOUT 120)
+  gtest_discover_tests(${name}_test TEST_PREFIX "${name}/" DISCOVERY_TIMEOUT 60 PROPERTIES LABELS ${name} TIMEOUT ${VOLTO_TEST_TIMEOUT_S})
 endfunction()
 
 # volto_fuzz_replay(FOLDER TARGET volto::rig): runs tests/fuzz/TARGET_fuzz.cpp on its corpus, whole and cut, as the plain test FOLDER/fuzz/TARGET;
@@ -48,5 +53,5 @@ function(volto_fuzz_replay folder target library)
                  ${PROJECT_SOURCE_DIR}/tests/fuzz/replay_main.cpp)
   target_link_libraries(volto_${target}_replay PRIVATE ${library} volto_build_options)
   add_test(NAME ${folder}/fuzz/${target} COMMAND volto_${target}_replay ${PROJECT_SOURCE_DIR}/tests/fuzz/corpus/${target})
-  set_tests_properties(${folder}/fuzz/${target} PROPERTIES LABELS ${folder} TIMEOUT 120)
+  set_tests_properties(${folder}/fuzz/${target} PROPERTIES LABELS ${folder} TIMEOUT ${VOLTO_TEST_TIMEOUT_S})
 endfunction()
