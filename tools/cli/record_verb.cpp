@@ -19,6 +19,7 @@
 #include "tools/cli/stop_signal.h"
 #include "tools/cli/verb.h"
 #include "tools/pipeline/pacer.h"
+#include "tracker/landmark_layout.h"
 
 namespace volto::cli {
 
@@ -31,18 +32,6 @@ struct Options {
   double seconds = 0;
   bool force = false;
 };
-
-std::string layoutName(LandmarkLayout layout) {
-  switch (layout) {
-    case LandmarkLayout::ibug68:
-      return "ibug68";
-    case LandmarkLayout::openseeface66:
-      return "openseeface66";
-    case LandmarkLayout::mediapipe478:
-      return "mediapipe478";
-  }
-  return "";
-}
 
 // The take's header says which landmarks are in it, so the file is opened when the first of them is there, or after a
 // moment without.
@@ -60,7 +49,7 @@ class Recorder {
     std::string layout;
     if (message.kind == protocol::MessageKind::landmarks) {
       protocol::LandmarkMessage landmarks;
-      if (protocol::decode(message.payload, landmarks)) layout = layoutName(landmarks.frame.layout);
+      if (protocol::decode(message.payload, landmarks)) layout = tracker::layoutName(landmarks.frame.layout);
     } else if (message.t_receive_ns - first_at_ns_ < kWaitForLandmarks_ns) {
       return;
     }
