@@ -40,11 +40,32 @@ struct RigidPart {
   std::array<double, 3> centre{0, 0, 0};   // mesh frame; an eyeball turns about it
 };
 
+// Displacement of some vertices, mesh frame and unit.
+struct SparseDisplacement {
+  std::vector<std::uint32_t> vertex;       // ascending
+  std::vector<std::array<float, 3>> displacement;
+
+  bool empty() const { return vertex.empty(); }
+};
+
 // A blendshape of the character. The displacement of the mask in mesh units and MESH frame; the mesh follows by the operator.
 struct Blendshape {
   std::string name;
   std::array<std::array<float, 3>, kFeaturePointCount> mask_displacement{};
   bool moves_mask = true;                  // false: not observable from the mask (tongueOut)
+  SparseDisplacement correction;           // what 84 points cannot say; added at the shape's weight
+};
+
+// A correction for shapes that act together, or for the way of one shape between its ends. Its weight is the product over its
+// drivers of the shape's weight w, or of 4 w (1 - w) for a driver that is `halfway`.
+struct Combination {
+  struct Driver {
+    std::uint16_t shape = 0;               // index into Rig::blendshapes
+    bool halfway = false;
+  };
+  std::string name;
+  std::vector<Driver> drivers;             // at least one
+  SparseDisplacement correction;
 };
 
 struct Rig {
@@ -62,6 +83,7 @@ struct Rig {
   DeformationOperator deformation;
   std::vector<RigidPart> rigid_parts;
   std::vector<Blendshape> blendshapes;                            // the 52 ARKit names by default
+  std::vector<Combination> combinations;
 };
 
 }  // namespace volto::rig
