@@ -4,8 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "capture/sha256.h"
 #include "recordings/make/motion.h"
-#include "recordings/make/sha256.h"
 #include "rig/control_mask.h"
 #include "rig/expression_table.h"
 #include "rig/fapu.h"
@@ -142,7 +142,7 @@ std::string Person::digest() const {
   };
   add(neutral_);
   for (const rig::FeaturePointPositions& move : moves_) add(move);
-  return sha256Hex(text);
+  return capture::sha256Hex(text);
 }
 
 }  // namespace volto::recordings

@@ -9,9 +9,9 @@
 
 #include <Eigen/Geometry>
 
+#include "capture/sha256.h"
 #include "protocol/take_writer.h"
 #include "recordings/make/person.h"
-#include "recordings/make/sha256.h"
 
 namespace volto::recordings {
 namespace {
@@ -119,7 +119,7 @@ std::string manifestEntry(const std::filesystem::path& folder, const std::string
          "\",\n      \"whence\": \"made by recordings/make (volto-make-take); no recording of a person is behind "
          "it\",\n"
          "      \"licence\": \"Apache-2.0\",\n      \"bytes\": " +
-         std::to_string(bytes.size()) + ",\n      \"sha256\": \"" + sha256Hex(bytes) + "\"\n    }";
+         std::to_string(bytes.size()) + ",\n      \"sha256\": \"" + capture::sha256Hex(bytes) + "\"\n    }";
 }
 
 }  // namespace

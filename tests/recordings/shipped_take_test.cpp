@@ -10,9 +10,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "capture/sha256.h"
 #include "protocol/take_reader.h"
 #include "recordings/make/person.h"
-#include "recordings/make/sha256.h"
 #include "tests/support/test_data.h"
 
 namespace volto::recordings {
@@ -37,11 +37,12 @@ std::vector<LandmarkFrame> framesOf(const std::filesystem::path& take) {
 }
 
 TEST(Sha256, AgreesWithTheStandardsExamples) {
-  EXPECT_EQ(sha256Hex(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
-  EXPECT_EQ(sha256Hex("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
-  EXPECT_EQ(sha256Hex("abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq"),
+  EXPECT_EQ(capture::sha256Hex(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+  EXPECT_EQ(capture::sha256Hex("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  EXPECT_EQ(capture::sha256Hex("abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq"),
             "248d6a61d20638b8e5c026930c3e6039a33ce45964ff2167f6ecedd419db06c1");
-  EXPECT_EQ(sha256Hex(std::string(1000000, 'a')), "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
+  EXPECT_EQ(capture::sha256Hex(std::string(1000000, 'a')),
+            "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
 }
 
 TEST(ShippedTake, EveryFileIsInTheManifestAndIsWhatItSays) {
@@ -50,7 +51,7 @@ TEST(ShippedTake, EveryFileIsInTheManifestAndIsWhatItSays) {
   for (const auto& entry : manifest.at("files")) {
     const std::string file = entry.at("file");
     const std::string bytes = contents(shipped() / file);
-    EXPECT_EQ(sha256Hex(bytes), entry.at("sha256")) << file;
+    EXPECT_EQ(capture::sha256Hex(bytes), entry.at("sha256")) << file;
     EXPECT_EQ(bytes.size(), entry.at("bytes")) << file;
     for (const char* key : {"what", "whence", "licence"})
       EXPECT_FALSE(entry.at(key).get<std::string>().empty()) << file << " " << key;

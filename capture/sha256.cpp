@@ -1,10 +1,10 @@
-#include "recordings/make/sha256.h"
+#include "capture/sha256.h"
 
 #include <array>
 #include <bit>
 #include <cstdint>
 
-namespace volto::recordings {
+namespace volto::capture {
 namespace {
 
 constexpr std::array<std::uint32_t, 64> kRound{
@@ -65,4 +65,4 @@ std::string sha256Hex(std::string_view bytes) {
   return out;
 }
 
-}  // namespace volto::recordings
+}  // namespace volto::capture

@@ -1,12 +1,12 @@
-// SHA-256 (FIPS 180-4), for the manifest.
+// SHA-256 (FIPS 180-4): whether a file is the one that a manifest names.
 #pragma once
 
 #include <string>
 #include <string_view>
 
-namespace volto::recordings {
+namespace volto::capture {
 
 // Lower-case hexadecimal.
 std::string sha256Hex(std::string_view bytes);
 
-}  // namespace volto::recordings
+}  // namespace volto::capture
