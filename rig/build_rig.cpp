@@ -7,7 +7,9 @@
 
 #include "rig/association.h"
 #include "rig/closest_point.h"
+#include "rig/find_contacts.h"
 #include "rig/head_frame.h"
+#include "rig/part_motion.h"
 #include "rig/rigid_parts.h"
 #include "rig/skin_rows.h"
 #include "rig/weld.h"
@@ -248,10 +250,12 @@ Rig buildRig(const Mesh& neutral, const FeaturePointChoices& points, const RigOp
   rig.rigid_parts = placeParts(neutral, skin, is_skin, {rig.feature_positions, rig.mesh_from_head, eye_separation},
                                association, rows);
   rig.deformation = compressed(rows);
+  rig.contacts = findContacts(rig, skin, association, on_skin);
   rig.association.triangle = std::move(association.triangle);
   rig.association.kind = std::move(association.kind);
   rig.region_of_influence = regionsOfInfluence().points;
   rig.blendshapes = arkitBlendshapes(rig);
+  rig.part_motions = partMotions(rig);
   return rig;
 }
 

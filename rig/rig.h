@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "rig/contacts.h"
 #include "rig/control_mask.h"
 #include "rig/expression_table.h"
 #include "rig/fapu.h"
@@ -68,6 +69,21 @@ struct Combination {
   SparseDisplacement correction;
 };
 
+// Parts that turn as bones do: lower teeth and tongue about the hinge of the jaw, an eyeball about its centre. The motion is
+// the sum over the blendshapes of weight x turn; what the operator does to these vertices is replaced by it.
+struct PartMotion {
+  struct Turn {
+    std::uint16_t shape = 0;               // index into Rig::blendshapes
+    std::array<float, 3> rotation{};       // axis times angle in radians at weight 1, mesh frame
+    std::array<float, 3> translation{};    // at weight 1, mesh frame and unit
+  };
+  RigidPart::Follows follows = RigidPart::Follows::jaw;
+  std::array<float, 3> pivot{};            // mesh frame
+  std::vector<std::uint32_t> vertices;     // ascending
+  std::vector<float> share;                // one per vertex, 0..1: of the motion
+  std::vector<Turn> turns;                 // ascending by shape
+};
+
 struct Rig {
   std::string name;                        // of the character: mesh file's stem by default
   std::string mesh_file;                   // file name only, for people
@@ -84,6 +100,8 @@ struct Rig {
   std::vector<RigidPart> rigid_parts;
   std::vector<Blendshape> blendshapes;                            // the 52 ARKit names by default
   std::vector<Combination> combinations;
+  std::vector<PartMotion> part_motions;
+  Contacts contacts;
 };
 
 }  // namespace volto::rig
