@@ -23,6 +23,12 @@ constexpr std::size_t landmarkCount(LandmarkLayout layout) {
   return 0;
 }
 
+// Where an eye's pupil is in the image.
+struct Pupil {
+  float x_px = 0.0F, y_px = 0.0F;
+  float confidence = 0.0F;  // 0..1; 0: not seen (closed, turned away), the position means nothing
+};
+
 struct LandmarkFrame {
   std::int64_t t_capture_ns = 0;   // monotonic clock, or nanoseconds since the start of the recording
   std::uint64_t capture_seq = 0;   // +1 per captured frame; a gap is frames lost before this point
@@ -39,6 +45,8 @@ struct LandmarkFrame {
   std::vector<std::array<float, 3>> points_camera_mm;
   // Empty, or one entry per point, 0..1.
   std::vector<float> point_confidence;
+  // The subject's right and left eye.
+  std::array<Pupil, 2> pupils{};
 };
 
 }  // namespace volto

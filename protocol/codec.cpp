@@ -254,10 +254,12 @@ Result Encoder::encode(const Stamp& stamp, const LandmarkFrame& frame) {
   const auto px = points ? structsToWire<wire::Vec2>(s.buffer, frame.points_px) : 0;
   const auto mm = points ? structsToWire<wire::Vec3>(s.buffer, frame.points_camera_mm) : 0;
   const auto confidence = points ? scalarsToWire<float>(s.buffer, frame.point_confidence) : 0;
+  const bool sees_pupils = points && (frame.pupils[0].confidence > 0 || frame.pupils[1].confidence > 0);
+  const auto pupils = sees_pupils ? structsToWire<wire::Pupil>(s.buffer, frame.pupils) : 0;
   const wire::Stamp wire_stamp = toWire(stamp, frame.capture_seq, frame.t_capture_ns);
   return s.finish(wire::CreateLandmarks(s.buffer, &wire_stamp, static_cast<wire::LandmarkLayout>(frame.layout),
                                         frame.face_present, frame.confidence, frame.image_width_px,
-                                        frame.image_height_px, frame.focal_length_px, px, mm, confidence));
+                                        frame.image_height_px, frame.focal_length_px, px, mm, confidence, pupils));
 }
 
 Result Encoder::encode(const Stamp& stamp, const MaskFrame& frame) {
@@ -392,6 +394,9 @@ Result decode(Bytes bytes, LandmarkMessage& out) {
     copyAll(t.points_px(), f.points_px);
     copyAll(t.points_camera_mm(), f.points_camera_mm);
     copyAll(t.point_confidence(), f.point_confidence);
+    f.pupils = {};
+    if (t.pupils() != nullptr && !copyExactly(t.pupils(), f.pupils))
+      return Result::bad(std::to_string(t.pupils()->size()) + " pupils; a face has two");
     if (!f.face_present && !(f.points_px.empty() && f.points_camera_mm.empty() && f.point_confidence.empty())) {
       return Result::bad("points without a face");
     }

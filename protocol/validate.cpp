@@ -125,6 +125,10 @@ Result validate(const LandmarkFrame& frame) {
   if (!allFinite(frame.points_px) || !allFinite(frame.points_camera_mm) || !allFinite(frame.point_confidence)) {
     return Result::bad("a landmark is not finite");
   }
+  for (const Pupil& pupil : frame.pupils) {
+    if (!std::isfinite(pupil.x_px) || !std::isfinite(pupil.y_px)) return Result::bad("a pupil is not finite");
+    if (Result r = confidenceOf(pupil.confidence); !r) return r;
+  }
   return {};
 }
 

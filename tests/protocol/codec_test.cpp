@@ -84,6 +84,11 @@ TEST(CodecTest, LandmarksComeBackAsTheyWent) {
   EXPECT_EQ(got.frame.points_px, sent.points_px);
   EXPECT_EQ(got.frame.points_camera_mm, sent.points_camera_mm);
   EXPECT_EQ(got.frame.point_confidence, sent.point_confidence);
+  for (std::size_t eye = 0; eye < 2; ++eye) {
+    EXPECT_EQ(got.frame.pupils[eye].x_px, sent.pupils[eye].x_px);
+    EXPECT_EQ(got.frame.pupils[eye].y_px, sent.pupils[eye].y_px);
+    EXPECT_EQ(got.frame.pupils[eye].confidence, sent.pupils[eye].confidence);
+  }
 }
 
 TEST(CodecTest, EveryLayoutComesBack) {

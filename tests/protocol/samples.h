@@ -36,6 +36,8 @@ inline LandmarkFrame sampleLandmarks(std::uint64_t number = 1) {
     frame.points_camera_mm.push_back({n, -n, 600.0F + n});
     frame.point_confidence.push_back(n / 68.0F);
   }
+  frame.pupils[0] = {510.5F, 280.25F, 0.75F};
+  frame.pupils[1] = {600.5F, 281.0F, 0.0F};
   return frame;
 }
 
