@@ -1,0 +1,156 @@
+#include "capture/detection/pupils.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "capture/detection/crop.h"
+
+namespace volto::capture {
+namespace {
+
+// The patch: the eye's corners lie on its middle row, kEye pixels apart.
+constexpr int kWidth = 60, kHeight = 40;
+constexpr double kEye = 40;
+constexpr double kIrisRadius = 0.5 * 11.7 / 30.0 * kEye;
+constexpr double kRingRadius = 1.55 * kIrisRadius;
+constexpr double kLeastOpening = 0.12, kFullOpening = 0.25;  // height of the opening, in eye widths
+constexpr double kSmallestEye_px = 7;
+constexpr float kLeastContrast = 8, kFullContrast = 40;  // grey levels between iris and what surrounds it
+constexpr float kLidDarkness = 0.25F;                    // how much of the disc must be open to count
+
+struct Column {
+  float top = 1e9F, bottom = -1e9F;
+};
+
+}  // namespace
+
+PupilFinder::PupilFinder()
+    : grey_(static_cast<std::size_t>(3 * kWidth * kHeight)), open_(static_cast<std::size_t>(kWidth * kHeight)) {
+  const int reach = static_cast<int>(std::ceil(kRingRadius));
+  for (int y = -reach; y <= reach; ++y) {
+    for (int x = -reach; x <= reach; ++x) {
+      const double r = std::hypot(x, y);
+      if (r <= kIrisRadius) {
+        disc_.push_back({x, y});
+      } else if (r <= kRingRadius) {
+        ring_.push_back({x, y});
+      }
+    }
+  }
+}
+
+void PupilFinder::find(const Image& image, LandmarkFrame& frame) {
+  frame.pupils = {};
+  if (!frame.face_present || frame.points_px.size() != landmarkCount(frame.layout)) return;
+  if (frame.layout == LandmarkLayout::mediapipe478) {
+    for (const auto& [eye, iris] : {std::pair<std::size_t, std::size_t>{0, 468}, {1, 473}})
+      frame.pupils[eye] = {frame.points_px[iris][0], frame.points_px[iris][1], 1.0F};
+    return;
+  }
+  const std::span<const std::array<float, 2>> points(frame.points_px);
+  frame.pupils[0] = findOne(image, points.subspan(36, 6));
+  frame.pupils[1] = findOne(image, points.subspan(42, 6));
+}
+
+// Lids in iBUG's order: the corner on the image's left, two of the upper lid, the other corner, two of the lower lid.
+Pupil PupilFinder::findOne(const Image& image, std::span<const std::array<float, 2>> lids) {
+  const double across_x = lids[3][0] - lids[0][0], across_y = lids[3][1] - lids[0][1];
+  const double width = std::hypot(across_x, across_y);
+  if (!(width >= kSmallestEye_px && width < 4096)) return {};
+  ImageFromCrop patch;
+  patch.a = across_x / kEye;
+  patch.b = across_y / kEye;
+  const double middle_x = 0.5 * (lids[0][0] + lids[3][0]), middle_y = 0.5 * (lids[0][1] + lids[3][1]);
+  patch.tx = middle_x - (patch.a * 0.5 * kWidth - patch.b * 0.5 * kHeight);
+  patch.ty = middle_y - (patch.b * 0.5 * kWidth + patch.a * 0.5 * kHeight);
+
+  // The opening: between the lids' polylines, in the patch.
+  std::array<std::array<float, 2>, 6> lid;
+  for (std::size_t i = 0; i < 6; ++i) lid[i] = patch.inverse(lids[i][0], lids[i][1]);
+  std::array<Column, kWidth> columns;
+  const auto line = [&](std::size_t from, std::size_t to, bool upper) {
+    for (int x = 0; x < kWidth; ++x) {
+      const float at = static_cast<float>(x) + 0.5F, low = std::min(lid[from][0], lid[to][0]),
+                  high = std::max(lid[from][0], lid[to][0]);
+      if (at < low || at > high || high - low < 1e-3F) continue;
+      const float share = (at - lid[from][0]) / (lid[to][0] - lid[from][0]);
+      const float y = lid[from][1] + share * (lid[to][1] - lid[from][1]);
+      Column& column = columns[static_cast<std::size_t>(x)];
+      if (upper) {
+        column.top = std::min(column.top, y);
+      } else {
+        column.bottom = std::max(column.bottom, y);
+      }
+    }
+  };
+  line(0, 1, true), line(1, 2, true), line(2, 3, true);
+  line(3, 4, false), line(4, 5, false), line(5, 0, false);
+  const double opening = 0.5 * ((lid[5][1] - lid[1][1]) + (lid[4][1] - lid[2][1])) / kEye;
+  if (!(opening > kLeastOpening)) return {};
+
+  Normalisation plain;
+  sampleCrop(image, patch, kWidth, kHeight, plain, false, grey_);
+  constexpr std::size_t kPlane = kWidth * kHeight;
+  for (std::size_t i = 0; i < kPlane; ++i)  // the red channel shows lids bright and the iris dark in every skin
+    grey_[i] = 0.2F * grey_[i] + 0.4F * grey_[i + kPlane] + 0.4F * grey_[i + 2 * kPlane];
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const Column& column = columns[static_cast<std::size_t>(x)];
+      const auto at = static_cast<float>(y) + 0.5F;
+      open_[static_cast<std::size_t>(y * kWidth + x)] =
+          std::clamp(std::min(at - column.top, column.bottom - at) + 0.5F, 0.0F, 1.0F);
+    }
+  }
+
+  const auto contrastAt = [&](int cx, int cy) {
+    const auto meanOf = [&](const std::vector<Tap>& taps, float& weight) {
+      float sum = 0;
+      weight = 0;
+      for (const Tap& tap : taps) {
+        const int x = cx + tap.x, y = cy + tap.y;
+        if (x < 0 || y < 0 || x >= kWidth || y >= kHeight) continue;
+        const auto i = static_cast<std::size_t>(y * kWidth + x);
+        sum += open_[i] * grey_[i];
+        weight += open_[i];
+      }
+      return weight > 0 ? sum / weight : 0.0F;
+    };
+    float inside = 0, outside = 0;
+    const float dark = meanOf(disc_, inside), bright = meanOf(ring_, outside);
+    const float seen = inside / static_cast<float>(disc_.size());
+    if (seen < kLidDarkness || outside < 8) return -1e9F;
+    return (bright - dark) * std::sqrt(seen);
+  };
+  // Every second place first, then around the best, then between the pixels.
+  int best_x = kWidth / 2, best_y = kHeight / 2;
+  float best = -1e9F;
+  const int low_x = static_cast<int>(0.5 * (kWidth - 0.8 * kEye)), high_x = kWidth - low_x;
+  const int low_y = static_cast<int>(0.5 * (kHeight - 0.6 * kEye)), high_y = kHeight - low_y;
+  const auto tryAt = [&](int x, int y) {
+    const float contrast = contrastAt(x, y);
+    if (contrast > best) best = contrast, best_x = x, best_y = y;
+  };
+  for (int y = low_y; y <= high_y; y += 2)
+    for (int x = low_x; x <= high_x; x += 2) tryAt(x, y);
+  const int coarse_x = best_x, coarse_y = best_y;
+  for (int y = coarse_y - 1; y <= coarse_y + 1; ++y)
+    for (int x = coarse_x - 1; x <= coarse_x + 1; ++x)
+      if (x != coarse_x || y != coarse_y) tryAt(x, y);
+  if (best < kLeastContrast) return {};
+  const auto peak = [&](float before, float after) {
+    const float bend = before - 2 * best + after;
+    return before > -1e8F && after > -1e8F && bend < -1e-3F ? std::clamp(0.5F * (before - after) / bend, -0.5F, 0.5F)
+                                                            : 0.0F;
+  };
+  const float x =
+      static_cast<float>(best_x) + 0.5F + peak(contrastAt(best_x - 1, best_y), contrastAt(best_x + 1, best_y));
+  const float y =
+      static_cast<float>(best_y) + 0.5F + peak(contrastAt(best_x, best_y - 1), contrastAt(best_x, best_y + 1));
+  const auto at = patch(x, y);
+  const auto openness =
+      static_cast<float>(std::clamp((opening - kLeastOpening) / (kFullOpening - kLeastOpening), 0.0, 1.0));
+  const float contrast = std::clamp((best - kLeastContrast) / (kFullContrast - kLeastContrast), 0.0F, 1.0F);
+  return {at[0], at[1], openness * contrast};
+}
+
+}  // namespace volto::capture
