@@ -1,0 +1,303 @@
+#include "rig/fitting/fit_points.h"
+
+#include <algorithm>
+#include <cmath>
+#include <variant>
+
+#include <Eigen/Geometry>
+
+#include "rig/closest_point.h"
+#include "rig/control_mask.h"
+#include "rig/fitting/landmark_checks.h"
+#include "rig/fitting/registration.h"
+#include "rig/fitting/target_surface.h"
+#include "rig/skin.h"
+#include "rig/weld.h"
+
+namespace volto::rig {
+
+const std::array<std::string_view, 10> kTenPoints = {"3.7", "3.12", "4.3", "4.4",  "9.3",
+                                                     "8.3", "8.4",  "2.1", "10.7", "10.8"};
+
+namespace {
+
+// A point less sure than this should be looked at.
+constexpr double kDoubtful = 0.5;
+// The expected error, in eye separations, at which confidence is one half.
+constexpr double kHalfConfidence_es = 0.1;
+
+std::string idOf(std::size_t p) { return std::string(featurePoints()[p].id); }
+
+bool isLoopPoint(std::size_t p) {
+  const MaskLoops& loops = maskLoops();
+  const auto in = [&](const auto& loop) { return std::find(loop.begin(), loop.end(), p) != loop.end(); };
+  return in(loops.left_eye) || in(loops.right_eye) || in(loops.mouth);
+}
+
+void requireUsable(const Mesh& mesh, const FeaturePointChoices& given, std::span<const RoughPoint> rough) {
+  if (mesh.vertexCount() == 0 || mesh.polygonCount() == 0)
+    throw InputError("the mesh has no faces; nothing can be fitted");
+  if (!mesh.positions.allFinite()) throw InputError("a vertex of the mesh has a position that is not finite");
+  for (const std::uint32_t v : mesh.corner_vertices)
+    if (v >= mesh.vertexCount())
+      throw InputError("a polygon of the mesh names vertex " + std::to_string(v) + ", the mesh has " +
+                       std::to_string(mesh.vertexCount()));
+  for (const auto& [p, choice] : given) {
+    if (p >= kFeaturePointCount)
+      throw InputError("feature point number " + std::to_string(p) + " is not one of the 84");
+    if (const auto* vertex = std::get_if<std::uint32_t>(&choice)) {
+      if (*vertex >= mesh.vertexCount())
+        throw InputError("feature point " + idOf(p) + " is vertex " + std::to_string(*vertex) + ", the mesh has " +
+                         std::to_string(mesh.vertexCount()) + " (counted from 0)");
+    } else if (!std::get<Eigen::Vector3d>(choice).allFinite()) {
+      throw InputError("feature point " + idOf(p) + " has a position that is not finite");
+    }
+  }
+  for (const RoughPoint& r : rough)
+    if (r.feature_point >= kFeaturePointCount || !r.position.allFinite() || !(r.sigma_es > 0))
+      throw InputError("a rough point is not one of the 84, not finite or without a deviation");
+}
+
+// The head in its own frame: which components are skin, which way is out, where the landmarks lie.
+class Target {
+ public:
+  Target(const Mesh& mesh, const FeaturePointChoices& given, std::span<const RoughPoint> rough)
+      : mesh_(mesh), skin_(prepareSkin(mesh, weldSeams(mesh, {}))) {
+    const ClosestPoint surface(mesh_.positions, skin_.triangles);
+    if (surface.empty()) throw InputError("every face of the mesh is degenerate; nothing can be fitted");
+    chooseComponents(surface, given, rough);
+    for (const auto& t : skin_.triangles)
+      if (is_skin_[skin_.component[t[0]]]) triangles_.push_back(t);
+    inside_out_ = signedVolume() < 0;
+    if (inside_out_)
+      for (auto& t : triangles_) std::swap(t[1], t[2]);
+    placeLandmarks(given, rough);
+  }
+
+  bool insideOut() const { return inside_out_; }
+  const std::vector<PlacedLandmark>& landmarks() const { return landmarks_; }
+
+  TargetSurface inFrameOf(const Similarity& mesh_from_generic) const {
+    VertexPositions positions(mesh_.positions.rows(), 3);
+    for (Eigen::Index v = 0; v < positions.rows(); ++v)
+      positions.row(v) = mesh_from_generic.inverse(mesh_.positions.row(v)).transpose();
+    return {std::move(positions), triangles_};
+  }
+
+ private:
+  // The component that most landmarks are nearest to, and every one of which a vertex was chosen.
+  void chooseComponents(const ClosestPoint& surface, const FeaturePointChoices& given,
+                        std::span<const RoughPoint> rough) {
+    const std::size_t components = 1 + *std::max_element(skin_.component.begin(), skin_.component.end());
+    std::vector<std::size_t> votes(components, 0), size(components, 0);
+    is_skin_.assign(components, false);
+    for (const auto& t : skin_.triangles) ++size[skin_.component[t[0]]];
+    const auto vote = [&](const Eigen::Vector3d& at) {
+      const SurfacePoint nearest = surface.find(at);
+      if (nearest.triangle >= 0) ++votes[skin_.component[surface.triangle(nearest.triangle)[0]]];
+    };
+    for (const auto& [p, choice] : given) {
+      if (const auto* vertex = std::get_if<std::uint32_t>(&choice)) {
+        const std::uint32_t c = skin_.component[*vertex];
+        ++votes[c];
+        is_skin_[c] = size[c] > 0;
+      } else {
+        vote(std::get<Eigen::Vector3d>(choice));
+      }
+    }
+    for (const RoughPoint& r : rough) vote(r.position);
+    std::size_t best = 0;
+    for (std::size_t c = 1; c < components; ++c)
+      if (votes[c] > votes[best] || (votes[c] == votes[best] && size[c] > size[best])) best = c;
+    is_skin_[best] = true;
+  }
+
+  double signedVolume() const {
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+    double total = 0, volume = 0;
+    const auto corner = [&](const std::array<std::uint32_t, 3>& t, std::size_t i) -> Eigen::Vector3d {
+      return mesh_.positions.row(t[i]);
+    };
+    for (const auto& t : triangles_) {
+      const double area = (corner(t, 1) - corner(t, 0)).cross(corner(t, 2) - corner(t, 0)).norm();
+      centre += area * (corner(t, 0) + corner(t, 1) + corner(t, 2)) / 3;
+      total += area;
+    }
+    if (!(total > 0)) return 0;
+    centre /= total;
+    for (const auto& t : triangles_)
+      volume += (corner(t, 0) - centre).dot((corner(t, 1) - centre).cross(corner(t, 2) - centre));
+    return volume;
+  }
+
+  void placeLandmarks(const FeaturePointChoices& given, std::span<const RoughPoint> rough) {
+    const ClosestPoint surface(mesh_.positions, triangles_);
+    const double turn = inside_out_ ? -1 : 1;
+    const auto place = [&](std::size_t p, const Eigen::Vector3d& at, double sigma) {
+      PlacedLandmark landmark{p, at, Eigen::Vector3d::Zero(), 0, sigma};
+      const SurfacePoint nearest = surface.find(at);
+      landmark.off_surface = nearest.distance;
+      for (std::size_t i = 0; i < 3; ++i)
+        landmark.normal +=
+            turn * nearest.barycentric[i] * skin_.normals.row(surface.triangle(nearest.triangle)[i]).transpose();
+      landmark.normal.normalize();
+      landmarks_.push_back(landmark);
+    };
+    for (const auto& [p, choice] : given) {
+      const auto* vertex = std::get_if<std::uint32_t>(&choice);
+      place(p, vertex != nullptr ? Eigen::Vector3d(mesh_.positions.row(*vertex)) : std::get<Eigen::Vector3d>(choice),
+            0);
+    }
+    for (const RoughPoint& r : rough)
+      if (!given.contains(r.feature_point)) place(r.feature_point, r.position, r.sigma_es);
+  }
+
+  const Mesh& mesh_;
+  Skin skin_;
+  std::vector<bool> is_skin_;  // per component
+  std::vector<std::array<std::uint32_t, 3>> triangles_;
+  std::vector<PlacedLandmark> landmarks_;
+  bool inside_out_ = false;
+};
+
+Eigen::Vector3d placeOn(const VertexPositions& positions, const SurfacePlace& place) {
+  Eigen::Vector3d out = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < 3; ++i) out += place.weights[i] * positions.row(place.vertices[i]).transpose();
+  return out;
+}
+
+SurfacePlace placeOf(const TargetSurface& target, const SurfaceHit& hit) {
+  return {target.triangle(hit.triangle), hit.barycentric};
+}
+
+// A point on the target. Points of the loops (lids, inner lips) are vertices where the mesh is fine enough: a position
+// between lips that touch would belong to both.
+FeaturePointChoice choiceFor(std::size_t p, const TargetSurface& target, const SurfaceHit& hit, const Similarity& frame,
+                             std::vector<bool>& vertex_taken) {
+  const auto& t = target.triangle(hit.triangle);
+  std::size_t nearest = 0;
+  double distance = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double d = (target.positions().row(t[i]).transpose() - hit.position).norm();
+    if (d < distance && !vertex_taken[t[i]]) {
+      distance = d;
+      nearest = i;
+    }
+  }
+  if (distance < (isLoopPoint(p) ? 0.03 : 0.005)) {
+    vertex_taken[t[nearest]] = true;
+    return t[nearest];
+  }
+  return Eigen::Vector3d(frame(hit.position));
+}
+
+std::vector<CorrespondingPlace> denseCorrespondence(const GenericHead& head, const VertexPositions& start,
+                                                    const LandmarkWarp& warp, const RegisteredFace& face,
+                                                    const TargetSurface& target) {
+  std::vector<CorrespondingPlace> out(head.mesh.vertexCount());
+  const auto set = [&](std::size_t v, const SurfaceHit& hit) {
+    if (hit.triangle < 0) return;
+    out[v] = {placeOf(target, hit), hit.distance, 1 / (1 + std::pow(hit.distance / 0.05, 2))};
+  };
+  std::vector<bool> done(out.size(), false);
+  for (std::size_t v = 0; v < head.vertex_of_face.size(); ++v) {
+    done[head.vertex_of_face[v]] = true;
+    set(head.vertex_of_face[v], face.hits[v]);
+  }
+  // The rest of the skin goes on as the face does.
+  constexpr std::size_t kSamples = 150;
+  std::vector<WarpLandmark> samples;
+  const std::size_t step = std::max<std::size_t>(1, head.vertex_of_face.size() / kSamples);
+  for (std::size_t v = 0; v < head.vertex_of_face.size(); v += step) {
+    const auto row = static_cast<Eigen::Index>(v);
+    samples.push_back({start.row(row), face.positions.row(row), 0.01});
+  }
+  const LandmarkWarp onward(std::move(samples));
+  VertexPositions all(head.mesh.positions.rows(), 3);
+  for (Eigen::Index v = 0; v < all.rows(); ++v)
+    if (!done[static_cast<std::size_t>(v)] && head.skin[static_cast<std::size_t>(v)])
+      all.row(v) = onward(warp(head.mesh.positions.row(v))).transpose();
+    else
+      all.row(v) = head.mesh.positions.row(v);
+  for (std::size_t v = 0; v < head.vertex_of_face.size(); ++v)
+    all.row(head.vertex_of_face[v]) = face.positions.row(static_cast<Eigen::Index>(v));
+  const VertexPositions normals = faceNormals(triangulate(head.mesh), all);
+  for (Eigen::Index v = 0; v < all.rows(); ++v)
+    if (!done[static_cast<std::size_t>(v)] && head.skin[static_cast<std::size_t>(v)])
+      set(static_cast<std::size_t>(v), target.find(all.row(v), normals.row(v), 0.2, 0.3));
+  return out;
+}
+
+}  // namespace
+
+FittedPoints fitPoints(const Mesh& mesh, const FeaturePointChoices& given, std::span<const RoughPoint> rough,
+                       const FitOptions& options) {
+  requireUsable(mesh, given, rough);
+  const Target on_mesh(mesh, given, rough);
+  const GenericHead& head = genericHead();
+  const HumanFace& human = options.human_face != nullptr ? *options.human_face : humanFace();
+
+  FeaturePointPositions generic_normals;
+  const std::vector<std::array<std::uint32_t, 3>> face_triangles = triangulate(head.face);
+  const VertexPositions rest_normals = faceNormals(face_triangles, head.face.positions);
+  for (std::size_t p = 0; p < kFeaturePointCount; ++p)
+    generic_normals.row(static_cast<Eigen::Index>(p)) = placeOn(rest_normals, head.points[p]).normalized().transpose();
+
+  FittedPoints out;
+  std::vector<PlacedLandmark> landmarks = on_mesh.landmarks();
+  FacePlacement placed = placeFace(landmarks, human.points, generic_normals, on_mesh.insideOut());
+  const Similarity& frame = placed.mesh_from_generic;
+  out.notes = std::move(placed.notes);
+  const TargetSurface target = on_mesh.inFrameOf(frame);
+
+  // Landmarks to landmarks, then surface to surface.
+  std::vector<WarpLandmark> pairs;
+  for (const PlacedLandmark& l : landmarks)
+    pairs.push_back(
+        {human.points.row(static_cast<Eigen::Index>(l.feature_point)), frame.inverse(l.position), l.sigma_es});
+  const LandmarkWarp warp(pairs);
+  VertexPositions start(head.face.positions.rows(), 3);
+  for (Eigen::Index v = 0; v < start.rows(); ++v) start.row(v) = warp(head.face.positions.row(v)).transpose();
+  std::vector<FacePin> pins;
+  for (const PlacedLandmark& l : landmarks)
+    pins.push_back({head.points[l.feature_point], frame.inverse(l.position),
+                    l.sigma_es > 0 ? 0.01 / (l.sigma_es * l.sigma_es) * 0.05 : 20.0});
+  const RegisteredFace face = registerFace(head, start, target, pins);
+  const VertexPositions normals = faceNormals(face_triangles, face.positions);
+
+  std::vector<bool> vertex_taken(mesh.vertexCount(), false);
+  for (const auto& [p, choice] : given)
+    if (const auto* vertex = std::get_if<std::uint32_t>(&choice)) vertex_taken[*vertex] = true;
+  for (const auto& [p, choice] : given)
+    out.points.emplace(placed.sides_exchanged ? featurePoints()[p].mirror : p, choice);
+  for (std::size_t p = 0; p < kFeaturePointCount; ++p) {
+    if (out.points.contains(p)) {
+      out.confidence[p] = 1;
+      continue;
+    }
+    const Eigen::Vector3d at = placeOn(face.positions, head.points[p]),
+                          normal = placeOn(normals, head.points[p]).normalized();
+    SurfaceHit hit = target.find(at, normal, 0.3, 0.3);
+    if (hit.triangle < 0) hit = target.find(at, normal, -2, std::numeric_limits<double>::infinity());
+    out.points.emplace(p, choiceFor(p, target, hit, frame, vertex_taken));
+    const double deviation = 0.5 * warp.deviation(human.points.row(static_cast<Eigen::Index>(p)));
+    const double error2 = std::pow(human.spread[p], 2) + deviation * deviation + hit.distance * hit.distance;
+    out.confidence[p] = 1 / (1 + error2 / (kHalfConfidence_es * kHalfConfidence_es));
+    if (out.confidence[p] < kDoubtful) out.to_check.push_back(p);
+  }
+  for (const auto& [p, choice] : out.points) {
+    const auto* vertex = std::get_if<std::uint32_t>(&choice);
+    out.positions.row(static_cast<Eigen::Index>(p)) =
+        vertex != nullptr ? Eigen::RowVector3d(mesh.positions.row(*vertex))
+                          : Eigen::RowVector3d(std::get<Eigen::Vector3d>(choice).transpose());
+  }
+  std::stable_sort(out.to_check.begin(), out.to_check.end(),
+                   [&](std::size_t a, std::size_t b) { return out.confidence[a] < out.confidence[b]; });
+  if (face.folded > 0)
+    out.notes.push_back(std::to_string(face.folded) +
+                        " triangles of the generic face folded on the way and were laid flat");
+  out.dense = denseCorrespondence(head, start, warp, face, target);
+  return out;
+}
+
+}  // namespace volto::rig

@@ -1,0 +1,195 @@
+#include "rig/fitting/generic_head.h"
+
+#include <algorithm>
+#include <cstring>
+#include <queue>
+#include <variant>
+
+#include <Eigen/Geometry>
+
+#include "rig/build_rig.h"
+#include "rig/closest_point.h"
+#include "rig/control_mask.h"
+#include "rig/fitting/human_face.h"
+#include "rig/fitting/landmark_warp.h"
+#include "rig/mesh_io.h"
+#include "rig/skin.h"
+
+namespace volto::rig {
+
+extern const char* const kGenericHeadObj;     // rig/assets/volto_head.obj
+extern const char* const kGenericHeadPoints;  // rig/assets/volto_head.points.json
+
+namespace {
+
+constexpr double kMargin_es = 0.5;
+
+bool isLoopPoint(std::size_t p) {
+  const MaskLoops& loops = maskLoops();
+  const auto in = [&](const auto& loop) { return std::find(loop.begin(), loop.end(), p) != loop.end(); };
+  return in(loops.left_eye) || in(loops.right_eye) || in(loops.mouth);
+}
+
+// Marks the vertices of the shortest way along the edges from a to b.
+void markPath(const EdgeGraph& graph, std::uint32_t a, std::uint32_t b, std::vector<bool>& marked) {
+  std::vector<float> distance(graph.vertexCount(), kUnreached);
+  std::vector<std::uint32_t> before(graph.vertexCount(), a);
+  using Entry = std::pair<float, std::uint32_t>;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
+  distance[a] = 0;
+  queue.push({0.0F, a});
+  while (!queue.empty()) {
+    const auto [d, v] = queue.top();
+    queue.pop();
+    if (v == b) break;
+    if (d > distance[v]) continue;
+    for (std::uint32_t e = graph.start[v]; e < graph.start[v + 1]; ++e) {
+      const std::uint32_t u = graph.neighbour[e];
+      if (d + graph.length[e] < distance[u]) {
+        distance[u] = d + graph.length[e];
+        before[u] = v;
+        queue.push({distance[u], u});
+      }
+    }
+  }
+  if (distance[b] == kUnreached) throw InputError("the generic head's points are not on one component");
+  marked[a] = true;
+  for (std::uint32_t v = b; v != a; v = before[v]) marked[v] = true;
+}
+
+std::uint32_t nearestVertex(const Mesh& mesh, const Eigen::RowVector3d& at, const std::vector<bool>* of = nullptr) {
+  std::uint32_t best = 0;
+  double best_distance = std::numeric_limits<double>::infinity();
+  for (std::uint32_t v = 0; v < mesh.vertexCount(); ++v) {
+    if (of != nullptr && !(*of)[v]) continue;
+    const double d = (mesh.positions.row(v) - at).squaredNorm();
+    if (d < best_distance) {
+      best_distance = d;
+      best = v;
+    }
+  }
+  return best;
+}
+
+template <std::size_t N>
+void markLoop(const EdgeGraph& graph, const std::array<std::uint8_t, N>& loop,
+              const std::array<std::uint32_t, kFeaturePointCount>& vertex, std::vector<bool>& marked) {
+  for (std::size_t i = 0; i < N; ++i) markPath(graph, vertex[loop[i]], vertex[loop[(i + 1) % N]], marked);
+}
+
+void bendToHumanProportions(Mesh& mesh, const FeaturePointPositions& points) {
+  const HumanFace& human = humanFace();
+  std::vector<WarpLandmark> pairs;
+  for (std::size_t p = 0; p < kFeaturePointCount; ++p) {
+    const auto row = static_cast<Eigen::Index>(p);
+    // Points on a line of the face mean the same on every head; others only about.
+    const double sigma = isLoopPoint(p) ? 0.002 : 0.02 + human.spread[p] / 2;
+    pairs.push_back({points.row(row), human.points.row(row), sigma});
+  }
+  const Similarity similarity = fitSimilarity(pairs).similarity;
+  for (WarpLandmark& pair : pairs) pair.from = similarity(pair.from);
+  const LandmarkWarp warp(std::move(pairs));
+  for (Eigen::Index v = 0; v < mesh.positions.rows(); ++v)
+    mesh.positions.row(v) = warp(similarity(mesh.positions.row(v))).transpose();
+}
+
+// Polygons on the outside of the face, over the vertices that are kept.
+void cutOutFace(GenericHead& head, const Skin& skin, const std::array<std::uint32_t, kFeaturePointCount>& vertex) {
+  const Mesh& mesh = head.mesh;
+  std::vector<bool> cut(mesh.vertexCount(), false);
+  const MaskLoops& loops = maskLoops();
+  markLoop(skin.graph, loops.left_eye, vertex, cut);
+  markLoop(skin.graph, loops.right_eye, vertex, cut);
+  markLoop(skin.graph, loops.mouth, vertex, cut);
+
+  std::vector<GeodesicSource> sources;
+  for (const std::uint32_t v : vertex) sources.push_back({v, 0.0F});
+  const GeodesicDistances near = geodesicDistances(skin.graph, sources, static_cast<float>(kMargin_es));
+  std::vector<bool> outside(mesh.vertexCount(), false);
+  std::vector<std::uint32_t> stack{vertex[featurePointIndex("9.3").value()]};
+  outside[stack.front()] = true;
+  while (!stack.empty()) {
+    const std::uint32_t v = stack.back();
+    stack.pop_back();
+    for (std::uint32_t e = skin.graph.start[v]; e < skin.graph.start[v + 1]; ++e) {
+      const std::uint32_t u = skin.graph.neighbour[e];
+      if (outside[u] || cut[u] || near.nearest_source[u] < 0) continue;
+      outside[u] = true;
+      stack.push_back(u);
+    }
+  }
+
+  constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> new_index(mesh.vertexCount(), kNone);
+  head.face.polygon_start.push_back(0);
+  for (std::size_t p = 0; p < mesh.polygonCount(); ++p) {
+    bool inside_face = true, any = false;
+    for (std::uint32_t c = mesh.polygon_start[p]; c < mesh.polygon_start[p + 1]; ++c) {
+      const std::uint32_t v = mesh.corner_vertices[c];
+      inside_face = inside_face && (outside[v] || cut[v]);
+      any = any || outside[v];
+    }
+    if (!inside_face || !any) continue;
+    for (std::uint32_t c = mesh.polygon_start[p]; c < mesh.polygon_start[p + 1]; ++c) {
+      const std::uint32_t v = mesh.corner_vertices[c];
+      if (new_index[v] == kNone) {
+        new_index[v] = static_cast<std::uint32_t>(head.vertex_of_face.size());
+        head.vertex_of_face.push_back(v);
+      }
+      head.face.corner_vertices.push_back(new_index[v]);
+    }
+    head.face.polygon_start.push_back(static_cast<std::uint32_t>(head.face.corner_vertices.size()));
+  }
+  head.face.positions.resize(static_cast<Eigen::Index>(head.vertex_of_face.size()), 3);
+  for (std::size_t v = 0; v < head.vertex_of_face.size(); ++v)
+    head.face.positions.row(static_cast<Eigen::Index>(v)) = mesh.positions.row(head.vertex_of_face[v]);
+
+  const ClosestPoint surface(head.face.positions, triangulate(head.face));
+  for (std::size_t p = 0; p < kFeaturePointCount; ++p) {
+    if (isLoopPoint(p)) {  // on the very edge
+      const std::uint32_t v = new_index[vertex[p]];
+      if (v == kNone) throw InputError("the generic head's lids and lips cannot be cut out along its points");
+      head.points[p] = {{v, v, v}, {1, 0, 0}};
+      continue;
+    }
+    const SurfacePoint at = surface.find(humanFace().points.row(static_cast<Eigen::Index>(p)).transpose());
+    head.points[p] = {surface.triangle(at.triangle), at.barycentric};
+  }
+}
+
+}  // namespace
+
+GenericHead makeGenericHead(Mesh mesh, const FeaturePointPositions& points) {
+  GenericHead head;
+  head.mesh = std::move(mesh);
+  std::array<std::uint32_t, kFeaturePointCount> vertex{};
+  for (std::size_t p = 0; p < kFeaturePointCount; ++p)
+    vertex[p] = nearestVertex(head.mesh, points.row(static_cast<Eigen::Index>(p)));
+  bendToHumanProportions(head.mesh, points);
+  std::vector<std::uint32_t> same_as(head.mesh.vertexCount());
+  for (std::uint32_t v = 0; v < same_as.size(); ++v) same_as[v] = v;
+  const Skin skin = prepareSkin(head.mesh, std::move(same_as));
+  head.skin.resize(head.mesh.vertexCount());
+  for (std::size_t v = 0; v < head.skin.size(); ++v) head.skin[v] = skin.component[v] == skin.component[vertex[0]];
+  cutOutFace(head, skin, vertex);
+  return head;
+}
+
+const GenericHead& genericHead() {
+  static const GenericHead head = [] {
+    Mesh mesh = parseObj(std::string_view(kGenericHeadObj, std::strlen(kGenericHeadObj)), "volto_head.obj");
+    const FeaturePointChoices choices = parseFeaturePoints(kGenericHeadPoints, "volto_head.points.json");
+    FeaturePointPositions points;
+    for (std::size_t p = 0; p < kFeaturePointCount; ++p) {
+      const FeaturePointChoice& choice = choices.at(p);
+      if (const auto* vertex = std::get_if<std::uint32_t>(&choice))
+        points.row(static_cast<Eigen::Index>(p)) = mesh.positions.row(*vertex);
+      else
+        points.row(static_cast<Eigen::Index>(p)) = std::get<Eigen::Vector3d>(choice).transpose();
+    }
+    return makeGenericHead(std::move(mesh), points);
+  }();
+  return head;
+}
+
+}  // namespace volto::rig
