@@ -35,9 +35,10 @@ class FileDescriptor {
 
 }  // namespace
 
-std::string readFileBytes(const std::filesystem::path& path, std::size_t max_bytes) {
+std::string readFileBytes(const std::filesystem::path& path, std::size_t max_bytes, LinksFollowed links) {
   // O_NONBLOCK: opening a pipe that nobody writes to must not hang; it has no effect on regular files.
-  const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
+  const int no_links = links == LinksFollowed::no ? O_NOFOLLOW : 0;
+  const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY | no_links));
   if (file.get() < 0) fail(errno, "cannot open " + path.string());
   struct stat status {};
   if (::fstat(file.get(), &status) != 0) fail(errno, "cannot read " + path.string());

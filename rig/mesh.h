@@ -20,13 +20,18 @@ struct Mesh {
   std::vector<std::uint32_t> polygon_start;    // #P + 1: polygon p is corners [polygon_start[p], polygon_start[p + 1])
 
   // Optional, for drawing and for writing files back: empty, or as many as said.
-  std::vector<std::array<float, 2>> corner_texcoords;  // one per corner
-  std::vector<std::uint32_t> polygon_material;         // one per polygon: index into materials
+  std::vector<std::array<float, 2>>
+      corner_texcoords;                              // one per corner; as in OBJ, (0, 0) is the lower left of the image
+  std::vector<std::array<float, 3>> vertex_colours;  // one per vertex: linear RGB 0..1
+  std::vector<std::uint32_t> polygon_material;       // one per polygon: index into materials
   struct Material {
     std::string name;
     std::array<float, 3> colour{0.8F, 0.8F, 0.8F};  // linear RGB 0..1
   };
   std::vector<Material> materials;
+
+  // What a reader passed over or mended, one line each; of this reading, not of the mesh: no file keeps it.
+  std::vector<std::string> notes;
 
   std::size_t vertexCount() const { return static_cast<std::size_t>(positions.rows()); }
   std::size_t polygonCount() const { return polygon_start.empty() ? 0 : polygon_start.size() - 1; }
@@ -34,6 +39,11 @@ struct Mesh {
 
 // Fan triangulation of every polygon: #T by 3 vertex indices, in polygon order.
 std::vector<std::array<std::uint32_t, 3>> triangulate(const Mesh& mesh);
+
+// Unit normals of the vertices at `positions`: the mean of their polygons' normals weighted by area; (0, 0, 1) for a
+// vertex in no polygon with an area. Vertices at the very same place in mesh.positions (seams of texture coordinates)
+// share one normal, unless their sides face apart, as closed lips do. #V by 3.
+VertexPositions smoothNormals(const Mesh& mesh, const VertexPositions& positions);
 
 // Connected components over shared vertices: component[v], numbered 0.. in order of first vertex; vertices in no
 // polygon get one of their own.

@@ -1,21 +1,20 @@
 // OBJ in a single pass over the bytes: 53 expressions of a head are read at every transfer, so speed matters here.
+#include "rig/obj_reader.h"
+
 #include <charconv>
 #include <cmath>
 #include <cstring>
 #include <string>
 #include <unordered_map>
 
+#include "rig/mesh_builder.h"
 #include "rig/mesh_io.h"
+#include "rig/mesh_limits.h"
 
 namespace volto::rig {
 namespace {
 
-constexpr std::size_t kMaxVertices = 1'000'000;
-constexpr std::size_t kMaxPolygons = 2'000'000;
-constexpr std::size_t kMaxCorners = 16'000'000;
-constexpr std::size_t kMaxPolygonCorners = 4'096;
-constexpr std::size_t kMaxLineBytes = 65'536;
-constexpr std::size_t kMaxMaterials = 65'536;
+constexpr std::size_t kMaxMaterialLibraries = 16;
 
 constexpr std::array<double, 23> kPowersOfTen = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,
                                                  1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
@@ -44,6 +43,8 @@ class ObjParser {
     finish();
     return std::move(mesh_);
   }
+
+  std::vector<std::string>& materialLibraries() { return material_libraries_; }
 
  private:
   [[noreturn]] void fail(const std::string& what) const { failAt(line_, what); }
@@ -156,7 +157,13 @@ class ObjParser {
       return endOfStatement("vn");
     }
     if (keyword == "usemtl") return material();
-    // Everything else (groups, smoothing, material libraries, curves) does not change the mesh. mtllib is never opened.
+    if (keyword == "mtllib") {
+      skipBlanks();
+      std::string name(restOfLine().substr(0, 1024));
+      if (material_libraries_.size() < kMaxMaterialLibraries) material_libraries_.push_back(std::move(name));
+      return;
+    }
+    // Everything else (groups, smoothing, curves) does not change the mesh.
     for (const char c : keyword)
       if (!((c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || isDigit(c)))
         fail(std::string("'") + wordAt(word) + "' is not an OBJ statement");
@@ -166,13 +173,23 @@ class ObjParser {
   void vertex() {
     if (coordinates_.size() / 3 >= kMaxVertices) fail("more than 1000000 vertices");
     for (int i = 0; i < 3; ++i) coordinates_.push_back(number("vertex"));
-    // Some programs add a weight, or a colour.
-    for (int extra = 0; extra < 4; ++extra) {
+    // Some programs add a weight, or a colour, or both.
+    std::array<float, 4> extra{};
+    std::size_t extras = 0;
+    for (; extras < extra.size(); ++extras) {
       skipBlanks();
       if (atLineEnd()) break;
-      number("vertex");
+      extra[extras] = static_cast<float>(number("vertex"));
     }
     endOfStatement("vertex");
+    const std::size_t vertices = coordinates_.size() / 3;
+    if (extras < 3 && colours_.empty()) return;
+    if (colours_.empty()) colours_.resize(vertices - 1, {1.0F, 1.0F, 1.0F});
+    const std::size_t first = extras - 3;
+    colours_.push_back(extras < 3
+                           ? std::array<float, 3>{1.0F, 1.0F, 1.0F}
+                           : std::array<float, 3>{linearFromDisplay(extra[first]), linearFromDisplay(extra[first + 1]),
+                                                  linearFromDisplay(extra[first + 2])});
   }
 
   void texcoord() {
@@ -273,6 +290,7 @@ class ObjParser {
       if (l.index >= static_cast<std::int64_t>(count)) tooLarge(l.line, l.index + 1, what, count);
     }
     mesh_.positions = Eigen::Map<const VertexPositions>(coordinates_.data(), static_cast<Eigen::Index>(vertices), 3);
+    mesh_.vertex_colours = std::move(colours_);
     if (!corner_texcoord_.empty()) {
       mesh_.corner_texcoords.reserve(corner_texcoord_.size());
       for (const std::int32_t t : corner_texcoord_)
@@ -293,7 +311,9 @@ class ObjParser {
   std::size_t line_ = 0;
   Mesh mesh_;
   std::vector<double> coordinates_;
+  std::vector<std::array<float, 3>> colours_;  // empty, or one per vertex; white where a vertex has none
   std::vector<std::array<float, 2>> texcoords_;
+  std::vector<std::string> material_libraries_;
   std::size_t normals_ = 0;
   std::vector<std::int32_t> corner_texcoord_;  // -1: none; empty until a face names one
   std::vector<Later> later_;                   // indices that were beyond the end when they were read
@@ -305,6 +325,13 @@ class ObjParser {
 
 Mesh parseObj(std::string_view text, const std::string& name_for_errors) {
   return ObjParser(text, name_for_errors).parse();
+}
+
+Mesh parseObj(std::string_view text, const std::string& name_for_errors, std::vector<std::string>& material_libraries) {
+  ObjParser parser(text, name_for_errors);
+  Mesh mesh = parser.parse();
+  material_libraries = std::move(parser.materialLibraries());
+  return mesh;
 }
 
 }  // namespace volto::rig

@@ -126,11 +126,14 @@ TEST(Obj, MixedCornersAreReadAndStraySlashesRefused) {
     EXPECT_NE(refused(std::string(kTriangle) + "vt 0 0\nvn 0 0 1\n" + bad + "\n"), "") << bad;
 }
 
-TEST(Obj, MaterialLibraryIsNeverOpened) {
+TEST(Obj, MaterialLibraryElsewhereIsNeverOpened) {
   const test::TemporaryDir folder;
   ASSERT_EQ(mkfifo((folder / "trap.mtl").c_str(), 0600), 0);  // opening it would hang
-  std::ofstream(folder / "head.obj") << "mtllib trap.mtl\nmtllib ../../etc/passwd\n" << kTriangle << "f 1 2 3\n";
-  EXPECT_EQ(readMesh(folder / "head.obj").vertexCount(), 3U);
+  std::ofstream(folder / "head.obj") << "mtllib trap.mtl\nmtllib ../../etc/passwd\n"
+                                     << kTriangle << "usemtl skin\nf 1 2 3\n";
+  const Mesh mesh = readMesh(folder / "head.obj");
+  EXPECT_EQ(mesh.vertexCount(), 3U);
+  EXPECT_EQ(mesh.notes.size(), 2U);
 }
 
 TEST(Obj, NumberOfManyDigitsIsReadOrRefused) {
