@@ -2,40 +2,27 @@
 
 #include <vector>
 
-#include "retarget/deformer.h"
-#include "retarget/eyes.h"
+#include "retarget/face_deformer.h"
 #include "retarget/mask_scale.h"
 #include "retarget/weight_solver.h"
 
 namespace volto::retarget {
-namespace {
-
-std::vector<Vertex> singlePrecision(const rig::VertexPositions& positions) {
-  std::vector<Vertex> out(static_cast<std::size_t>(positions.rows()));
-  for (std::size_t v = 0; v < out.size(); ++v) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      out[v][axis] = static_cast<float>(positions(static_cast<Eigen::Index>(v), static_cast<Eigen::Index>(axis)));
-    }
-  }
-  return out;
-}
-
-}  // namespace
-
 struct Retargeter::State {
   RetargetOptions options;
   MaskScale scale;
-  Deformer deformer;
-  Eyes eyes;
+  FaceDeformer deformer;
   WeightSolver solver;
   MeshMaskDisplacement displacement{};
+  std::vector<float> weights;
+  std::vector<std::uint8_t> observed;
 
   State(const rig::Rig& rig, const RetargetOptions& wanted)
       : options(wanted),
         scale(rig),
-        deformer(rig.deformation, singlePrecision(rig.neutral.positions)),
-        eyes(rig),
-        solver(rig.blendshapes, rig.fapu.fapu.eye_separation) {}
+        deformer(rig),
+        solver(rig.blendshapes, rig.fapu.fapu.eye_separation),
+        weights(solver.shapeCount()),
+        observed(solver.shapeCount()) {}
 };
 
 Retargeter::Retargeter(const rig::Rig& rig, const RetargetOptions& options)
@@ -56,18 +43,18 @@ void Retargeter::push(const MaskFrame& in, AvatarFrame& out) {
   out.head = in.head;
   out.gaze = in.gaze;
   s.scale.apply(in.displacement_fapu, s.displacement);
+  // The mesh needs the weights too: what 84 points cannot say hangs on them.
+  s.solver.solve(s.displacement, in, s.weights, s.observed);
   if (s.options.weights) {
-    out.weights.resize(s.solver.shapeCount());
-    out.observed.resize(s.solver.shapeCount());
-    s.solver.solve(s.displacement, in, out.weights, out.observed);
+    out.weights.assign(s.weights.begin(), s.weights.end());
+    out.observed.assign(s.observed.begin(), s.observed.end());
   } else {
     out.weights.clear();
     out.observed.clear();
   }
   if (s.options.mesh) {
     out.vertices.resize(s.deformer.vertexCount());
-    s.deformer.deform(s.displacement, out.vertices);
-    s.eyes.turn(in.gaze, out.vertices);
+    s.deformer.deform(s.displacement, s.weights, in.gaze, out.vertices);
   } else {
     out.vertices.clear();
   }
