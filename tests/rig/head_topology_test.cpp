@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "rig/assets/head/head_mesh.h"
+#include "tests/rig/head_intersections.h"
 
 namespace volto::head {
 namespace {
@@ -99,6 +100,44 @@ TEST_P(HeadTopology, NoTriangleIsDegenerate) {
       smallest = std::min(smallest, 0.5 * length(cross(b - a, c - a)));
     }
   EXPECT_GT(smallest, 5e-6);  // square centimetres; five decimals are written
+}
+
+// The whole head at rest: skin, eyeballs, teeth, tongue, lashes and brows, each with itself and with the others.
+TEST_P(HeadTopology, NoTriangleGoesThroughAnother) {
+  std::vector<Triangle> triangles;
+  std::vector<int> component;
+  for (std::size_t p = 0; p < head().polygons.size(); ++p) {
+    const auto& corners = head().polygons[p].corners;
+    for (std::size_t i = 1; i + 1 < corners.size(); ++i) {
+      triangles.push_back({corners[0], corners[i], corners[i + 1]});
+      component.push_back(head().polygon_component[p]);
+    }
+  }
+  const auto crossing = crossingTriangles(head().vertices, triangles);
+  for (std::size_t i = 0; i < crossing.size() && i < 5; ++i) {
+    const auto& [a, b] = crossing[i];
+    const Vec3& place = at(triangles[a][0]);
+    ADD_FAILURE() << head().components[static_cast<std::size_t>(component[a])].name << " and "
+                  << head().components[static_cast<std::size_t>(component[b])].name << " near " << place.x << ' '
+                  << place.y << ' ' << place.z;
+  }
+  EXPECT_EQ(crossing.size(), 0U);
+}
+
+TEST(CrossingTriangles, AreFoundWhereTheyAreAndNowhereElse) {
+  const std::vector<Vec3> at{{0, 0, 0},     {1, 0, 0},   {0, 1, 0},   // flat
+                             {.2, .2, -1},  {.2, .3, 1}, {2, 2, 1},   // through it
+                             {0, 0, .1},    {1, 0, .1},  {0, 1, .1},  // above it, cut by the second too
+                             {1, 1, 0},                               // neighbour in the same plane
+                             {.3, .3, 1e-4}};                         // folded back onto the first
+  const auto pairs = [&](std::vector<Triangle> triangles) { return crossingTriangles(at, triangles).size(); };
+  EXPECT_EQ(pairs({{0, 1, 2}, {3, 4, 5}}), 1U);
+  EXPECT_EQ(pairs({{0, 1, 2}, {3, 4, 5}, {6, 7, 8}}), 2U);
+  EXPECT_EQ(pairs({{0, 1, 2}, {6, 7, 8}}), 0U);
+  EXPECT_EQ(pairs({{0, 1, 2}, {2, 1, 9}}), 0U);
+  EXPECT_EQ(pairs({{0, 1, 2}, {2, 1, 10}}), 1U) << "folded over the shared edge";
+  EXPECT_EQ(pairs({{0, 1, 2}, {0, 3, 4}}), 1U) << "one shared vertex, and through the inside";
+  EXPECT_EQ(pairs({{0, 1, 2}, {0, 6, 8}}), 0U) << "one shared vertex, and nothing else";
 }
 
 TEST_P(HeadTopology, FacesLookOutOfEveryComponent) {

@@ -21,18 +21,18 @@ Palette paletteOf(const Colour (&colours)[static_cast<std::size_t>(Material::cou
 
 constexpr Colour kAdultColours[] = {
     {Material::skin, {0.72, 0.47, 0.36}},    {Material::hair, {0.085, 0.05, 0.036}},
-    {Material::lips, {0.58, 0.24, 0.22}},    {Material::mouth, {0.22, 0.06, 0.06}},
+    {Material::lips, {0.60, 0.29, 0.26}},    {Material::mouth, {0.22, 0.06, 0.06}},
     {Material::nostril, {0.20, 0.08, 0.06}}, {Material::eye_white, {0.86, 0.85, 0.83}},
-    {Material::iris, {0.13, 0.28, 0.33}},    {Material::iris_rim, {0.04, 0.09, 0.12}},
+    {Material::iris, {0.16, 0.30, 0.30}},    {Material::iris_rim, {0.03, 0.07, 0.08}},
     {Material::pupil, {0.01, 0.01, 0.012}},  {Material::caruncle, {0.62, 0.33, 0.28}},
     {Material::teeth, {0.85, 0.82, 0.74}},   {Material::gums, {0.52, 0.20, 0.20}},
-    {Material::tongue, {0.55, 0.20, 0.20}},  {Material::lashes, {0.03, 0.02, 0.02}},
-    {Material::brows, {0.10, 0.06, 0.045}},
+    {Material::tongue, {0.55, 0.20, 0.20}},  {Material::lashes, {0.035, 0.024, 0.022}},
+    {Material::brows, {0.12, 0.072, 0.052}},
 };
 
 constexpr Colour kCreatureColours[] = {
     {Material::skin, {0.24, 0.55, 0.42}},    {Material::hair, {0.07, 0.24, 0.27}},
-    {Material::lips, {0.15, 0.34, 0.31}},    {Material::mouth, {0.16, 0.04, 0.08}},
+    {Material::lips, {0.22, 0.40, 0.35}},    {Material::mouth, {0.16, 0.04, 0.08}},
     {Material::nostril, {0.06, 0.16, 0.14}}, {Material::eye_white, {0.90, 0.90, 0.80}},
     {Material::iris, {0.78, 0.40, 0.04}},    {Material::iris_rim, {0.26, 0.10, 0.01}},
     {Material::pupil, {0.01, 0.01, 0.012}},  {Material::caruncle, {0.14, 0.32, 0.28}},
@@ -77,6 +77,9 @@ Vec3 stretched(const Proportions& k, const Vec3& p) {
   const double front = smoothstep(-2.0, 5.0, p.z);
   u.x += (k.mouth_width - 1) * plateau(std::fabs(p.y + 6.7), 1.0, 6.5) * front * p.x;
 
+  u.y += k.mouth_smile * smoothstep(0.2, 3.9, std::fabs(p.x)) *
+         plateau(length({0.6 * p.x, p.y + 6.6, p.z - 8.5}), 1.2, 4.2);
+
   const double chin = smoothstep(-8.0, -11.0, p.y) * front;
   u.x += (k.chin_width - 1) * smoothstep(-7.5, -10.0, p.y) * front * p.x;
   u.y += k.chin_rise * chin;
@@ -106,7 +109,8 @@ Vec3 movedEar(const Proportions& k, const Vec3& p, double weight) {
   const EarFrame frame = earFrame();
   const Vec3 q = p - frame.origin;
   double a = dot(q, frame.back), b = dot(q, frame.up), h = dot(q, frame.out);
-  a *= 1 + (k.ear_size - 1) * weight;
+  constexpr double kHinge = -0.8;  // where the ear's front grows out of the cheek
+  a += (k.ear_size - 1) * weight * std::fmax(0, a - kHinge);
   b *= 1 + (k.ear_size - 1) * weight;
   // The tip: the upper part grows in length and narrows as it does.
   const double up = clamp01((dot(q, frame.up) + 0.6) / 3.6), tip = up * up * weight;
@@ -114,9 +118,9 @@ Vec3 movedEar(const Proportions& k, const Vec3& p, double weight) {
   a += (0.55 * k.ear_size - a) * narrow + 0.45 * k.ear_tip * tip;
   b += 0.85 * k.ear_tip * tip;
   // Turned out about the line where the ear's front grows out of the cheek.
-  const double turn = k.ear_flare * weight, c = std::cos(turn), s = std::sin(turn), hinge = -0.8;
-  const double from_hinge = a - hinge, height = h;
-  a = hinge + from_hinge * c - height * s;
+  const double turn = k.ear_flare * weight, c = std::cos(turn), s = std::sin(turn);
+  const double from_hinge = a - kHinge, height = h;
+  a = kHinge + from_hinge * c - height * s;
   h = from_hinge * s + height * c;
   const Vec3 to = frame.back * a + frame.up * b + frame.out * h;
   const Vec3 from = frame.back * dot(q, frame.back) + frame.up * dot(q, frame.up) + frame.out * dot(q, frame.out);
@@ -149,7 +153,11 @@ std::vector<double> freedom(const HalfMesh& mesh) {
     const double nose = 1 - 0.85 * plateau(length(v.position - Vec3{0, -3.2, 9.6}), 1.6, 2.8);
     const double muzzle = 1 - plateau(length(v.position - Vec3{0, -6.4, 9.0}), 2.4, 4.0);
     const bool free = v.hold == Hold::skin && v.strip != Strip::nostril && !v.border;
-    out.push_back(free ? lids * nose * muzzle : 0);
+    const double lips = v.strip == Strip::mouth ? clamp01(kLipBorder - v.ring) : 1;
+    if (v.strip == Strip::eye && v.ring < kLidCrease)  // the fold over the lid, where there is one
+      out.push_back(0.7 * (kLidCrease - v.ring));
+    else
+      out.push_back(free ? lips * lids * nose * muzzle * smoothstep(-2.0, 4.0, v.position.z) : 0);
   }
   return out;
 }
@@ -186,20 +194,21 @@ Character adult() { return {"volto_head", "Volto's head", {}, paletteOf(kAdultCo
 
 Character creature() {
   Proportions k;
-  k.skull_width = 1.30;
-  k.skull_height = 1.12;
-  k.skull_length = 1.12;
+  k.skull_width = 1.28;
+  k.skull_height = 1.08;
+  k.skull_length = 1.02;
   k.neck_thickness = 0.66;
-  k.eye_size = 1.75;
-  k.eye_shift = {1.15, 0.35, -0.75};
-  k.lid_opening = 0.65;
-  k.lid_thickness = 0.26;
+  k.eye_size = 1.68;
+  k.eye_shift = {1.05, 0.25, -0.60};
+  k.lid_opening = 0.55;
+  k.lid_thickness = 0.0;
   k.iris_size = 1.18;
   k.pupil_size = 1.45;
-  k.nose_width = 1.35;
-  k.nose_height = 0.85;
-  k.nose_depth = 0.75;
-  k.mouth_width = 1.34;
+  k.nose_width = 1.15;
+  k.nose_height = 0.78;
+  k.nose_depth = 0.66;
+  k.mouth_width = 1.38;
+  k.mouth_smile = 0.85;
   k.chin_width = 0.80;
   k.chin_rise = 0.5;
   k.chin_retreat = 0.5;

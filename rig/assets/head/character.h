@@ -27,10 +27,11 @@ struct Proportions {
   double nose_width = 1, nose_height = 1, nose_depth = 1;
   // Mouth and what is level with it; chin below it.
   double mouth_width = 1;
+  double mouth_smile = 0;  // how far the corners stand higher
   double chin_width = 1, chin_rise = 0, chin_retreat = 0;
   // Ears: all of the ear off the head, in its own plane; then a tip of this length; and turned away from the head.
   double ear_size = 1, ear_tip = 0, ear_flare = 0;  // flare in radians
-  double hair_thickness = 0.24;                     // 0: bald
+  double hair_thickness = 0.75;                     // 0: bald
   int smoothness = 0;  // rounds of evening out what lies between eyes, nose, lips and ears: fewer folds, rounder forms
 };
 

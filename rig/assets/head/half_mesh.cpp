@@ -28,16 +28,16 @@ constexpr std::array<Row, kRows + 1> kRowTable{{
     {8.7, 8.7, 8.7, 0},                                   // crown
     {6.5, 6.2, 5.8, 0},                                   // hair line
     {4.2, 3.6, 3.0, 0},                                   // forehead
-    {2.10, 1.55, 0.6, 0},                                 // brows: top of the eye block
-    {1.05, 0.60, -0.4, 0},                                // ear block begins
+    {2.10, 2.10, 0.9, 0},                                 // brows: top of the eye block
+    {1.05, 1.20, -0.2, 0},                                // ear block begins
     {-0.05, -0.55, -1.3, 0},                              // corners of the eyes
     {-1.0, -1.85, -2.3, 0},     {-1.95, -3.05, -3.3, 0},  // bottom of the eye block
-    {-2.75, -4.35, -4.3, 0},                              // above the tip of the nose, end of the ear block
-    {-3.45, -4.9, -5.0, 0},                               // tip of the nose
-    {-4.08, -5.4, -5.8, 0},                               // nostril
+    {-2.75, -4.65, -4.5, 0},                              // above the tip of the nose, end of the ear block
+    {-3.45, -5.2, -5.2, 0},                               // tip of the nose
+    {-4.08, -5.6, -5.8, 0},                               // nostril
     {-4.58, -5.8, -6.5, 0},                               // base of the nose
     {-5.2, -6.2, -7.2, 0},                                // top of the mouth block
-    {-6.7, -6.9, -8.2, 0},                                // corners of the mouth
+    {-6.3, -6.7, -8.2, 0},                                // corners of the mouth
     {-8.5, -7.7, -9.2, 0},                                // bottom of the mouth block
     {-9.9, -8.7, -10.2, 0},                               // chin
     {-11.0, -9.8, -11.2, 0},                              // bottom of the chin
@@ -52,8 +52,8 @@ struct ColumnAngles {
 constexpr std::array<ColumnAngles, 10> kColumnTable{{
     {0, {0, 9, 18, 27, 37, 48, 59, 71, 83, 95, 107, 119, 139, 159, 180}},
     {1, {0, 4.5, 9, 14, 19.5, 26, 34, 46, 64, 82, 95, 109, 132, 156, 180}},
-    {3, {0, 3.1, 6.3, 9.6, 14.6, 20.3, 27, 37, 59, 82, 95, 109, 132, 156, 180}},
-    {7, {0, 2.7, 5.6, 9.2, 14.8, 20.8, 28, 38, 58, 82, 95, 109, 132, 156, 180}},
+    {3, {0, 2.3, 4.7, 7.4, 14.0, 20.3, 27, 37, 59, 82, 95, 109, 132, 156, 180}},
+    {7, {0, 2.3, 4.9, 7.8, 14.2, 20.8, 28, 38, 58, 82, 95, 109, 132, 156, 180}},
     {8, {0, 2.2, 4.9, 9.4, 15.5, 22, 30, 40.5, 59, 82, 95, 109, 132, 156, 180}},
     {9, {0, 2.2, 5.6, 10.2, 16.0, 23, 32, 42, 60, 82, 95, 109, 132, 156, 180}},
     {10, {0, 1.7, 6.4, 10.6, 16.3, 23.7, 33, 44, 61, 82, 95, 109, 132, 156, 180}},
@@ -62,7 +62,7 @@ constexpr std::array<ColumnAngles, 10> kColumnTable{{
     {20, {0, 12.8, 25.7, 38.5, 51.4, 64.3, 77, 90, 102, 115, 128, 141, 154, 167, 180}},
 }};
 
-constexpr Vec3 kNostril{0.70, -4.36, 9.98}, kNostrilInward{-0.05, 0.85, -0.50};
+constexpr Vec3 kNostril{0.68, -4.36, 9.9}, kNostrilInward{-0.05, 0.85, -0.50};
 
 double columnAngle(int row, int column) {
   std::size_t k = 0;
@@ -135,7 +135,7 @@ class CageBuilder {
   static bool inEar(int r, int c) { return r >= kEarTop && r < kEarBottom && c >= kEarFront && c < kEarBehind; }
   // Close-cropped hair: over the forehead, down before and behind the ear, to the nape.
   static Material gridMaterial(int r, int c) {
-    const bool hair = r < 1 || (r == 1 && c >= 7) || (r >= 2 && r <= 4 && c >= kEarFront - 1) ||
+    const bool hair = r < 1 || (r == 1 && c >= 7) || (r >= 2 && r <= 5 && c >= kEarFront - 1) ||
                       (r <= kEarBottom + 1 && c >= kEarBehind);
     return hair ? Material::hair : Material::skin;
   }
@@ -232,8 +232,8 @@ class CageBuilder {
     for (int r = kEyeTop; r < kEyeBottom; ++r) block.push_back(grid(r, kEyeOuter));
     for (int c = kEyeOuter; c > kEyeInner; --c) block.push_back(grid(kEyeBottom, c));
     for (int r = kEyeBottom; r > kMiddle; --r) block.push_back(grid(r, kEyeInner));
-    const auto orbit = skinRing(block, Strip::eye, kLidMarginFront, 1, 0.34, false);
-    const auto fold = skinRing(block, Strip::eye, kLidMarginFront, 2, 0.68, false);
+    const auto orbit = stripRing(Strip::eye, kOrbit, kEyeAround, false);
+    const auto fold = stripRing(Strip::eye, kLidCrease, kEyeAround, false);
     const auto front = stripRing(Strip::eye, kLidMarginFront, kEyeAround, false);
     const auto back = stripRing(Strip::eye, kLidMarginBack, kEyeAround, false);
     const auto pocket = stripRing(Strip::eye, kLidPocket, kEyeAround, false);
@@ -272,7 +272,7 @@ class CageBuilder {
       v.around = static_cast<double>(i);
     }
     std::vector<std::vector<int>> rings{block};
-    for (const double t : {0.22, 0.38, 0.52, 0.70}) {
+    for (const double t : {0.13, 0.25, 0.40, 0.65}) {
       std::vector<int> ring;
       for (std::size_t i = 0; i < block.size(); ++i) {
         ring.push_back(addSkin(
@@ -298,13 +298,18 @@ class CageBuilder {
     for (int r = kEarTop; r < kEarBottom; ++r) block.push_back(grid(r, kEarBehind));
     for (int c = kEarBehind; c > kEarFront; --c) block.push_back(grid(kEarBottom, c));
     for (int r = kEarBottom; r > kMiddle; --r) block.push_back(grid(r, kEarFront));
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      HalfVertex& v = mesh_.vertices[static_cast<std::size_t>(block[i])];
+      v.strip = Strip::ear;
+      v.around = static_cast<double>(i);
+    }
     std::vector<std::vector<int>> rings{block};
     for (double ring = kEarRoot; ring <= kEarFloor; ring += 1)
       rings.push_back(stripRing(Strip::ear, ring, kEarAround, false));
     for (std::size_t k = 0; k + 1 < rings.size(); ++k) joinRings(rings[k], rings[k + 1], true, Material::skin);
     // Hair above and behind the ear, down to where it leaves the head.
     const std::size_t first = mesh_.polygons.size() - (rings.size() - 1) * kEarAround;
-    for (std::size_t i = 1; i < 7; ++i) mesh_.polygons[first + i].material = Material::hair;
+    for (std::size_t i = 2; i < 7; ++i) mesh_.polygons[first + i].material = Material::hair;
     const auto& f = rings.back();
     // Cap: a ladder from front to back.
     addPolygon({f[0], f[11], f[1]}, Material::skin);
@@ -393,7 +398,7 @@ HalfMesh split(const HalfMesh& coarse) {
 
 void raiseHair(HalfMesh& mesh, double thickness) {
   // Rings of vertices inward from the hair line.
-  constexpr int kRamp = 6;
+  constexpr int kRamp = 8;
   std::vector<int> depth(mesh.vertices.size(), kRamp);
   for (const Polygon& polygon : mesh.polygons)
     if (polygon.material != Material::hair)
@@ -411,13 +416,23 @@ void raiseHair(HalfMesh& mesh, double thickness) {
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
     if (depth[i] == 0) continue;
     HalfVertex& v = mesh.vertices[i];
-    const double t = static_cast<double>(depth[i]) / kRamp;
-    Vec3 normal = normalized(skinGradient(v.position));
+    const Vec3 p = v.position;
+    // A quick step at the hair line, then growing inward.
+    const double t = static_cast<double>(depth[i]) / kRamp, ramp = 0.30 * std::fmin(1, 3.0 * t) + 0.70 * t * (2 - t);
+    Vec3 normal = normalized(skinGradient(p));
     if (v.midline) normal.x = 0;
+    // Full on top and in front, short at the sides and at the nape.
+    const double top = smoothstep(3.5, 10.0, p.y), front = smoothstep(-3, 6.5, p.z);
+    const double fullness = 0.22 + top * (0.95 + 0.95 * front);
+    // Combed back: furrows that run from front to back, between locks of the same angle about the head's long axis.
+    const double angle = std::atan2(p.x, p.y + 1.0);
+    const double lock = std::cos(angle * 9.5 - 0.35 * smoothstep(-6, 6, p.z));
+    const double furrow = 0.22 * (1 - std::sqrt(std::fabs(lock))) * smoothstep(0, 3, p.y);
     // Thinner where the ear stands in the way.
-    const double z = (v.position.z + 0.1) / 2.0, y = (v.position.y + 1.65) / 3.2;
-    const double near_ear = v.position.x > 4 ? 1 - smoothstep(0.95, 1.6, std::sqrt(y * y + z * z)) : 0;
-    v.position = v.position + normal * (thickness * (1 - 0.8 * near_ear) * std::sqrt(t * (2 - t)));
+    const double z = (p.z + 0.1) / 2.0, y = (p.y + 1.65) / 3.2;
+    const double near_ear = p.x > 4 ? 1 - smoothstep(0.95, 1.6, std::sqrt(y * y + z * z)) : 0;
+    v.position = p + normal * (thickness * ramp * (1 - 0.85 * near_ear) * std::fmax(0.15, fullness - furrow));
+    if (v.midline) v.position.x = 0;
   }
 }
 
@@ -470,8 +485,11 @@ void relax(HalfMesh& mesh, int rounds, double strength) {
           // Along a ring around a hole the pull is weak: a ring that shortens itself would slip into the hole.
           if ((v.strip == Strip::eye || v.strip == Strip::mouth) && v.strip == other.strip && v.ring == other.ring)
             w *= 0.15;
+          if (v.strip == Strip::mouth && (other.strip != Strip::mouth || other.ring < v.ring)) w *= 1.5;
+          // Around the ear's root the skin would be drawn under the ear.
+          if (v.strip == Strip::ear && (other.strip != Strip::ear || other.ring < v.ring)) w *= 2.2;
           // Rings that end in nothing would draw together on a point: the outer neighbour pulls more.
-          if (v.strip == Strip::nostril && (other.strip != Strip::nostril || other.ring < v.ring)) w *= 2.3;
+          if (v.strip == Strip::nostril && (other.strip != Strip::nostril || other.ring < v.ring)) w *= 3.0;
           sum = sum + other.position * w;
           weight += w;
         }

@@ -37,7 +37,8 @@ void append(Head& head, const HalfMesh& half, const std::string& name) {
       out.material = polygon.material;
       for (const int c : polygon.corners)
         out.corners.push_back((side == 0 ? left : right)[static_cast<std::size_t>(c)]);
-      if (side == 1) std::reverse(out.corners.begin(), out.corners.end());
+      // The same corner first, so that triangulated polygons mirror too.
+      if (side == 1) std::reverse(out.corners.begin() + 1, out.corners.end());
       head.polygons.push_back(out);
       head.polygon_component.push_back(component);
     }
@@ -71,6 +72,8 @@ constexpr StripPlace kOnStrips[] = {
     {"12.6", "12.10", Strip::eye, kLidMarginFront, 6},
     {"12.7", "12.11", Strip::eye, kLidMarginFront, 14},
     {"12.8", "12.12", Strip::eye, kLidMarginFront, 10},
+    {"3.9", "3.10", Strip::eye, kLidCrease, 12},
+    {"3.13", "3.14", Strip::eye, kLidCrease, 4},
 };
 
 // On the skin straight behind (x, y) seen from in front, or near a place in space on the sides.
@@ -88,8 +91,6 @@ constexpr SkinPlace kOnSkin[] = {
     {"12.19", "12.20", {6.05, -5.9, 2.0}, false},
     {"10.7", "10.8", {6.6, -4.1, 1.45}, false},
     {"10.9", "10.10", {7.0, 0.35, 1.35}, false},
-    {"3.9", "3.10", {3.1, -1.15, 0}, true},
-    {"3.13", "3.14", {3.15, 1.02, 0}, true},
     {"4.1", "4.2", {1.2, 2.04, 0}, true},
     {"4.3", "4.4", {3.6, 2.46, 0}, true},
     {"4.5", "4.6", {5.05, 1.85, 0}, true},

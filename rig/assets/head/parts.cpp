@@ -92,7 +92,7 @@ HalfMesh makeTeeth(const Arch& arch, double width_scale) {
     const double round = 4 * f * (1 - f);  // 0 between two teeth, 1 in the middle of one
     const double molar = smoothstep(2.5, 4.0, static_cast<double>(tooth));
     // Profile: gum in front, over the tooth to the biting edge, back up behind.
-    constexpr std::array<double, kProfile + 1> kDown{-0.55, 0.0, 0.06, 0.5, 0.88, 1.0, 0.96, 0.6, 0.0, -0.55};
+    constexpr std::array<double, kProfile + 1> kDown{-0.30, 0.0, 0.06, 0.5, 0.88, 1.0, 0.96, 0.6, 0.0, -0.30};
     constexpr std::array<double, kProfile + 1> kIn{0.06, 0.02, 0.0, -0.04, 0.0, 0.10, 0.20, 0.32, 0.45, 0.5};
     const auto k = static_cast<std::size_t>(row);
     double down = kDown[k], in = kIn[k];
@@ -143,8 +143,8 @@ HalfMesh makeEyeball(double iris_size, double pupil_size) {
   ringAt(iris, Material::iris);
   ringAt(iris_rim, Material::iris_rim);
   const double start = angles.back();
-  for (int i = 1; i <= 8; ++i) {
-    angles.push_back(lerp(start, kPi * 0.97, i / 8.0));
+  for (int i = 1; i <= 6; ++i) {
+    angles.push_back(lerp(start, kPi * 0.96, i / 6.0));
     materials.push_back(Material::eye_white);
   }
   const auto at = [&](int row, int column) {
@@ -164,8 +164,8 @@ HalfMesh makeEyeball(double iris_size, double pupil_size) {
   return mesh;
 }
 
-HalfMesh makeUpperTeeth() { return makeTeeth({2.60, 8.95, 5.6, -6.05, -6.98}, 0.92); }
-HalfMesh makeLowerTeeth() { return makeTeeth({2.40, 8.70, 5.5, -7.75, -6.88}, 0.84); }
+HalfMesh makeUpperTeeth() { return makeTeeth({2.45, 8.80, 5.6, -6.05, -6.98}, 0.88); }
+HalfMesh makeLowerTeeth() { return makeTeeth({2.25, 8.52, 5.5, -7.75, -6.88}, 0.80); }
 
 HalfMesh makeTongue() {
   HalfMesh mesh;
@@ -173,7 +173,7 @@ HalfMesh makeTongue() {
   const auto at = [&](int row, int column) {
     const double t = (row + 0.35) / (kAlong + 0.35);
     const double a = kPi * column / kAround;
-    const double width = 1.45 * std::sqrt(1 - (1 - t) * (1 - t) * (1 - t) * (1 - t)),
+    const double width = 1.15 * std::sqrt(1 - (1 - t) * (1 - t) * (1 - t) * (1 - t)),
                  thick = 0.18 + 0.34 * std::sqrt(t);
     const double groove =
         0.10 * smoothstep(0.05, 0.4, t) * (1 - smoothstep(0.0, 0.35, std::sin(a))) * (column < kAround / 2 ? 1 : 0);
@@ -198,19 +198,19 @@ HalfMesh makeTongue() {
 
 HalfMesh makeUpperLashes() {
   HalfMesh mesh;
-  constexpr int kSteps = 28;
+  constexpr int kSteps = 24;
   const auto at = [&](int row, int column) {
     const double t = static_cast<double>(column) / kSteps;
-    const double around = lerp(0.9, 8.0, t);
-    const Vec3 root = lidMargin(around);
-    const Vec3 out = normalized(root - kEyeCentre);
-    const double reach = 0.04 + 0.22 * smoothstep(0.0, 0.75, t) * (1 - 0.85 * smoothstep(0.84, 1.0, t));
-    const Vec3 sideways{0.35 * (t - 0.35), 0, 0};
-    const Vec3 forward = normalized(out + sideways + Vec3{0, 0.12, 0});
-    Vec3 p = root - out * 0.015;
-    if (row == 1) p = p + Vec3{0, -0.028, 0} + forward * (reach * 0.5) + Vec3{0, -0.012, 0};
-    if (row == 2) p = p + forward * reach + Vec3{0, 0.30 * reach, 0};
-    if (row == 3) p = p + Vec3{0, 0.022, 0} + forward * (reach * 0.5);
+    const double around = lerp(1.2, 7.6, t);
+    const Vec3 margin = lidMargin(around);
+    const Vec3 out = normalized(margin - kEyeCentre);
+    const Vec3 root = margin + normalized(out + Vec3{0, -0.6, 0.6}) * 0.035;  // before the lid, not in it
+    const double reach = 0.05 + 0.25 * smoothstep(0.0, 0.75, t) * (1 - 0.8 * smoothstep(0.86, 1.0, t));
+    const Vec3 forward = normalized(out + Vec3{0.4 * (t - 0.3), 0.10, 0.25});
+    Vec3 p = root;
+    if (row == 1) p = p + Vec3{0, -0.035, 0} + forward * (reach * 0.45);
+    if (row == 2) p = p + forward * reach + Vec3{0, 0.35 * reach, 0};
+    if (row == 3) p = p + Vec3{0, 0.020, 0.004} + forward * (reach * 0.45);
     return vertex(p);
   };
   // A thin wedge: underside from the margin to the tip, and back over the top.
@@ -227,34 +227,36 @@ Vec3 browLine(double t) {
   // Quadratic through the inner end, the peak and the outer end.
   const double x = lerp(1.05, 5.15, t);
   const double past = (t - 0.64) / 0.36;
-  const double y = t < 0.64 ? lerp(2.05, 2.46, std::sin(t / 0.64 * kPi / 2)) : 2.46 - 0.66 * past * past;
+  const double y = t < 0.64 ? lerp(2.20, 2.52, std::sin(t / 0.64 * kPi / 2)) : 2.52 - 0.55 * past * past;
   return castToSkin({x, y, 16}, {0, 0, -1});
 }
 
 HalfMesh makeBrow() {
   HalfMesh mesh;
-  constexpr int kSteps = 24, kAcross = 5;
+  // A flat lens over the skin: from the upper edge over the front to the lower edge, and back up close to the skin.
+  constexpr int kSteps = 20, kAcross = 5;
   const auto at = [&](int row, int column) {
     const double t = static_cast<double>(column) / kSteps;
     const Vec3 middle = browLine(t);
-    const double half = 0.27 * (1 - 0.80 * smoothstep(0.35, 1.0, t)) * (0.55 + 0.45 * smoothstep(0.0, 0.10, t));
-    const double s = 1 - 2.0 * row / kAcross;  // 1 upper edge, -1 lower edge
-    const Vec3 n = normalized(skinGradient(middle));
-    Vec3 p = castToSkin({middle.x, middle.y + half * s, 16}, {0, 0, -1});
-    const double lift = 0.10 * (1 - s * s) * (0.4 + 0.6 * half / 0.27) + 0.015;
-    return vertex(p + n * lift);
+    const double half = 0.27 * (1 - 0.86 * smoothstep(0.25, 1.0, t)) * (0.30 + 0.70 * smoothstep(0.0, 0.20, t));
+    const bool front = row <= kAcross;
+    const double s =
+        front ? 1 - 2.0 * row / kAcross : -1 + 2.0 * (row - kAcross) / kAcross;  // 1 upper edge, -1 lower edge
+    const Vec3 on_skin = castToSkin({middle.x, middle.y + half * s, 16}, {0, 0, -1});
+    const Vec3 n = normalized(skinGradient(on_skin));
+    return vertex(on_skin + n * (0.035 + (front ? 0.05 * (1 - s * s) * (0.3 + 0.7 * half / 0.27) : 0.0)));
   };
-  addSheet(mesh, kAcross, kSteps, false, false, at, [](int, int) { return Material::brows; });
-  const auto index = [&](int r, int c) { return r * (kSteps + 1) + c; };
-  // Behind: a strip from the lower to the upper edge, under the skin; the ends.
-  for (int c = 0; c < kSteps; ++c)
-    mesh.polygons.push_back(
-        {{index(kAcross, c), index(0, c), index(0, c + 1), index(kAcross, c + 1)}, Material::brows});
-  mesh.polygons.push_back({{index(0, 0), index(5, 0), index(4, 0), index(1, 0)}, Material::brows});
-  mesh.polygons.push_back({{index(1, 0), index(4, 0), index(3, 0), index(2, 0)}, Material::brows});
-  const int e = kSteps;
-  mesh.polygons.push_back({{index(0, e), index(1, e), index(4, e), index(5, e)}, Material::brows});
-  mesh.polygons.push_back({{index(1, e), index(2, e), index(3, e), index(4, e)}, Material::brows});
+  addSheet(mesh, 2 * kAcross, kSteps, true, false, at, [](int, int) { return Material::brows; });
+  const auto index = [&](int r, int c) { return (r % (2 * kAcross)) * (kSteps + 1) + c; };
+  for (int r = 0; r < kAcross; ++r) {  // the ends: front row r lies over back row 2 * kAcross - r
+    const int back = 2 * kAcross - r;
+    std::vector<int> inner{index(r, 0), index(back, 0), index(back - 1, 0), index(r + 1, 0)};
+    std::vector<int> outer{index(r + 1, kSteps), index(back - 1, kSteps), index(back, kSteps), index(r, kSteps)};
+    if (r == 0) inner.erase(inner.begin() + 1), outer.erase(outer.begin() + 2);
+    if (r + 1 == kAcross) inner.erase(inner.begin() + 2), outer.erase(outer.begin() + 1);
+    mesh.polygons.push_back({inner, Material::brows});
+    mesh.polygons.push_back({outer, Material::brows});
+  }
   return mesh;
 }
 

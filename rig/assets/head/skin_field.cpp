@@ -21,9 +21,10 @@ double ellipsoid(const Vec3& p, const Vec3& c, const Vec3& r) {
   return k1 > 1e-9 ? k0 * (k0 - 1) / k1 : -r.x;
 }
 
-// Where the upper lid folds, relative to the eyeball's centre, seen from in front.
-constexpr Vec3 kLidFold[] = {{-1.30, 0.30, 0}, {-0.85, 0.72, 0}, {-0.25, 0.93, 0},
-                             {0.35, 0.93, 0},  {0.95, 0.74, 0},  {1.50, 0.36, 0}};
+// The middle of the fold of skin over the upper lid, relative to the eyeball's centre.
+constexpr Vec3 kLidFold[] = {{-1.42, 0.42, 0.85}, {-0.85, 1.02, 1.10}, {-0.10, 1.29, 1.12},
+                             {0.65, 1.28, 0.98},  {1.30, 1.03, 0.62},  {1.85, 0.62, 0.05}};
+constexpr double kFoldRadius[] = {0.22, 0.30, 0.30, 0.30, 0.30, 0.20};
 
 double sphere(const Vec3& p, const Vec3& c, double r) { return length(p - c) - r; }
 
@@ -59,62 +60,59 @@ double skinDistance(const Vec3& point) {
   const Vec3 m{std::sqrt(p.x * p.x + 0.02), p.y,
                p.z};  // rounded |x|: no crease at the midline for parts that stand beside it
 
-  // Skull and forehead.
-  double d = ellipsoid(p, {0, 3.1, -0.6}, {7.3, 8.1, 8.8});
-  d = melt(d, ellipsoid(p, {0, 3.7, 2.2}, {6.2, 5.6, 6.85}), 2.0);
-  // Face: maxilla, cheek bones, jaw.
-  d = melt(d, ellipsoid(p, {0, -3.4, 3.0}, {5.2, 6.6, 6.0}), 1.8);
-  d = melt(d, ellipsoid(m, {3.6, -2.6, 5.2}, {2.2, 1.9, 2.1}), 2.4);
-  d = melt(d, limb(m, {4.5, -1.9, 4.4}, 1.2, {5.75, -0.9, 0.6}, 0.9), 2.2);
-  d = melt(d, ellipsoid(m, {3.2, -5.5, 4.4}, {2.05, 2.8, 2.6}), 2.2);
-  d = melt(d, limb(m, {4.05, -6.5, 1.8}, 1.0, {1.0, -9.45, 7.2}, 1.25), 2.2);
-  d = melt(d, limb(m, {5.35, -2.0, 0.8}, 0.9, {4.05, -6.5, 1.8}, 1.0), 2.2);
-  d = melt(d, ellipsoid(p, {0, -9.65, 7.85}, {1.5, 1.35, 1.75}), 1.6);
-  d = melt(d, ellipsoid(p, {0, -9.2, 3.4}, {2.2, 1.65, 4.2}), 1.6);
+  // Skull, forehead, temples.
+  double d = ellipsoid(p, {0, 3.2, -0.9}, {7.4, 8.0, 8.9});
+  d = melt(d, ellipsoid(p, {0, 4.0, 1.9}, {6.6, 5.6, 7.1}), 2.0);
+  d = melt(d, ellipsoid(m, {3.8, 0.4, 3.5}, {2.6, 3.6, 3.3}), 2.2);
+  // Face: maxilla, cheek bones, cheeks, jaw.
+  d = melt(d, ellipsoid(p, {0, -3.2, 2.7}, {5.5, 6.6, 6.2}), 1.8);
+  d = melt(d, ellipsoid(m, {3.55, -2.35, 5.5}, {2.3, 1.9, 2.15}), 2.2);
+  d = melt(d, limb(m, {4.7, -1.8, 4.2}, 1.15, {5.95, -0.9, 0.6}, 0.9), 2.2);
+  d = melt(d, ellipsoid(m, {2.9, -5.2, 4.8}, {2.6, 3.2, 2.75}), 2.4);
+  d = melt(d, limb(m, {3.85, -6.55, 2.2}, 1.0, {1.0, -9.3, 6.9}, 1.2), 2.4);
+  d = melt(d, limb(m, {5.35, -2.0, 0.8}, 0.95, {3.85, -6.55, 2.2}, 1.0), 2.4);
+  d = melt(d, ellipsoid(p, {0, -9.45, 7.6}, {1.55, 1.3, 1.75}), 1.8);
+  d = melt(d, ellipsoid(p, {0, -8.9, 3.4}, {2.6, 1.65, 4.2}), 1.8);
   // Muzzle: the teeth behind the lips.
-  d = melt(d, ellipsoid(p, {0, -6.6, 7.2}, {3.4, 2.8, 2.75}), 2.0);
-  d = melt(d, ellipsoid(m, {1.5, -3.6, 7.75}, {1.5, 2.0, 1.40}), 1.8);
+  d = melt(d, ellipsoid(p, {0, -6.5, 6.9}, {3.3, 2.8, 2.85}), 2.2);
+  d = melt(d, ellipsoid(m, {1.4, -3.8, 7.6}, {1.5, 2.0, 1.40}), 1.8);
   // Neck.
-  d = melt(d, limb(p, {0, -4.0, -2.9}, 4.5, {0, -19.5, -3.4}, 5.2), 3.2);
-  d = melt(d, limb(m, {4.1, -5.0, -2.7}, 0.7, {1.1, -18.5, 1.3}, 0.8), 2.2);
-  d = melt(d, limb(m, {2.2, -13.5, -4.0}, 2.2, {5.4, -20.0, -3.6}, 2.4), 2.6);
-  d = melt(d, ellipsoid(p, {0, -13.4, 1.2}, {0.8, 1.3, 0.8}), 1.6);
+  d = melt(d, limb(p, {0, -4.0, -2.9}, 4.3, {0, -19.5, -3.4}, 4.8), 3.0);
+  d = melt(d, limb(m, {4.2, -5.0, -2.7}, 0.7, {1.0, -18.5, 1.1}, 0.75), 2.2);
+  d = melt(d, limb(m, {2.2, -13.5, -4.0}, 2.0, {5.0, -20.5, -3.8}, 2.2), 2.6);
+  d = melt(d, ellipsoid(p, {0, -13.4, 0.9}, {0.8, 1.3, 0.8}), 1.6);
 
   // Orbits and brow ridge.
-  d = carve(d, ellipsoid(m, {2.8, 0.25, 9.25}, {1.8, 1.10, 1.4}), 1.4);
-  d = melt(d, limb(m, {0.6, 1.75, 8.25}, 0.6, {3.2, 2.2, 7.7}, 0.62), 1.3);
-  d = melt(d, limb(m, {3.2, 2.2, 7.7}, 0.62, {5.2, 0.6, 4.9}, 0.5), 1.8);
-
-  d = melt(d, ellipsoid(m, {3.2, -1.80, 6.6}, {1.8, 1.1, 1.40}), 1.5);
+  d = carve(d, ellipsoid(m, {3.0, 0.10, 9.15}, {1.65, 1.10, 1.20}), 1.3);
+  d = melt(d, limb(m, {0.8, 2.2, 8.10}, 0.6, {3.2, 2.45, 7.68}, 0.62), 1.7);
+  d = melt(d, limb(m, {3.2, 2.45, 7.68}, 0.62, {5.1, 1.15, 5.6}, 0.55), 2.0);
+  d = melt(d, ellipsoid(m, {3.2, -1.80, 6.55}, {1.8, 1.1, 1.40}), 1.6);
 
   // Nose: bridge, tip, wings, columella.
-  double nose = limb(p, {0, 0.7, 8.25}, 0.58, {0, -1.4, 9.3}, 0.62);
-  nose = melt(nose, limb(p, {0, -1.4, 9.3}, 0.62, {0, -3.2, 10.3}, 0.70), 0.3);
-  nose = melt(nose, limb(m, {0.5, 0.4, 7.9}, 0.45, {0.95, -3.2, 9.0}, 0.6), 0.9);
-  nose = melt(nose, ellipsoid(p, {0, -3.42, 10.62}, {0.88, 0.74, 0.85}), 0.6);
-  nose = melt(nose, ellipsoid(m, {1.06, -3.88, 9.68}, {0.60, 0.58, 0.80}), 0.9);
-  nose = melt(nose, limb(p, {0, -3.9, 10.5}, 0.36, {0, -4.45, 9.7}, 0.42), 0.45);
-  d = melt(d, nose, 1.0);
+  double nose = limb(p, {0, 0.7, 8.3}, 0.50, {0, -1.5, 9.3}, 0.52);
+  nose = melt(nose, limb(p, {0, -1.5, 9.3}, 0.52, {0, -3.0, 10.3}, 0.56), 0.3);
+  nose = melt(nose, limb(m, {0.5, 0.4, 7.8}, 0.42, {0.85, -3.1, 9.0}, 0.52), 0.9);
+  nose = melt(nose, ellipsoid(p, {0, -3.36, 10.40}, {0.92, 0.74, 0.78}), 0.6);
+  nose = melt(nose, ellipsoid(m, {1.00, -3.80, 9.45}, {0.56, 0.60, 0.90}), 0.8);
+  nose = melt(nose, limb(p, {0, -3.9, 10.3}, 0.40, {0, -4.42, 9.5}, 0.46), 0.6);
+  d = melt(d, nose, 0.9);
 
-  // The lids lie on a sphere a little larger than the eyeball; a furrow parts the upper one from the fold under the
-  // brow.
-  d = melt(d, sphere({m.x, p.y, p.z}, kEyeCentre, kEyeRadius + kLidThickness), 0.5);
-  if (p.z > 6.5) {
-    const Vec3 e{p.x - kEyeCentre.x, p.y - kEyeCentre.y, 0};
-    double furrow = 0, fold = 0;
-    for (std::size_t i = 0; i + 1 < std::size(kLidFold); ++i) {
-      furrow = std::max(furrow, ridge(e, kLidFold[i], kLidFold[i + 1], 0.10));
-      fold = std::max(fold, ridge(e - Vec3{0, 0.30, 0}, kLidFold[i], kLidFold[i + 1], 0.22));
-    }
-    d += (0.06 * furrow - 0.10 * fold) * smoothstep(6.5, 7.0, p.z);
+  // The skin that folds over the upper lid, and the lids: they lie on a sphere a little larger than the eyeball. The
+  // upper one meets the fold sharply, in the crease; the lower one runs out into the cheek.
+  if (p.z > 6.0) {
+    for (std::size_t i = 0; i + 1 < std::size(kLidFold); ++i)
+      d = melt(d, limb(p, kEyeCentre + kLidFold[i], kFoldRadius[i], kEyeCentre + kLidFold[i + 1], kFoldRadius[i + 1]),
+               0.8);
+    const double upper = smoothstep(-0.1, 0.35, p.y - 0.1 * (p.x - kEyeCentre.x));
+    d = melt(d, sphere({m.x, p.y, p.z}, kEyeCentre, kEyeRadius + kLidThickness), lerp(0.5, 0.10, upper));
   }
 
   // Sculpting: + digs in, - builds up.
-  d += 0.10 * bump(p, {0, -5.15, 10.2}, {0.28, 0.6, 0.9});            // philtrum
-  d += 0.12 * ridge(p, {1.75, -3.5, 9.5}, {1.72, -4.35, 9.4}, 0.26);  // groove behind the nose wing
-  d += 0.06 * ridge(p, {1.95, -4.3, 9.3}, {3.2, -6.4, 8.7}, 0.6);     // nasolabial fold
-  d += 0.18 * bump(p, {0, -8.45, 9.7}, {1.6, 0.45, 1.2});             // under the lower lip
-  d += 0.20 * bump(p, {5.8, 2.8, 5.0}, {1.2, 2.2, 2.2});              // temple
+  d += 0.09 * bump(p, {0, -5.15, 10.0}, {0.26, 0.6, 0.9});            // philtrum
+  d += 0.10 * ridge(p, {1.70, -3.4, 9.4}, {1.66, -4.30, 9.3}, 0.24);  // groove behind the nose wing
+  d += 0.06 * ridge(p, {1.95, -4.3, 9.2}, {3.1, -6.2, 8.4}, 0.6);     // nasolabial fold
+  d += 0.16 * bump(p, {0, -8.45, 9.5}, {1.6, 0.45, 1.2});             // under the lower lip
+  d += 0.12 * bump(p, {5.9, 2.8, 5.0}, {1.2, 2.2, 2.2});              // temple
   return d;
 }
 

@@ -10,7 +10,7 @@ namespace volto::head {
 // Distances after anthropometric averages (adult head: length 19 cm, breadth 15.2 cm, pupils 6.2 cm apart).
 inline constexpr Vec3 kEyeCentre{3.12, 0.0, 6.95};  // left eyeball
 inline constexpr double kEyeRadius = 1.365;
-inline constexpr double kLidThickness = 0.26;
+inline constexpr double kLidThickness = 0.15;
 inline constexpr double kLidGap = 0.02;  // between eyeball and the back of the lid margin
 
 double skinDistance(const Vec3& p);

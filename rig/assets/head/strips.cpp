@@ -34,36 +34,54 @@ double wrappedSpline(const double (&knots)[N], double t) {
 // --- Eye
 // -------------------------------------------------------------------------------------------------------------------------
 
-// Palpebral fissure relative to the eyeball's centre, 16 knots around from the inner corner over the upper lid.
-constexpr double kFissureX[16] = {-1.50, -1.22, -0.82, -0.38, 0.06, 0.50,  0.90,  1.22,
-                                  1.44,  1.24,  0.94,  0.54,  0.08, -0.40, -0.84, -1.22};
-constexpr double kFissureY[16] = {-0.18, 0.10,  0.33,  0.47,  0.52,  0.51,  0.43,  0.27,
-                                  0.04,  -0.18, -0.35, -0.47, -0.52, -0.50, -0.43, -0.32};
+// Curves around the eye, relative to the eyeball's centre and seen from in front: 16 knots from the inner corner over
+// the upper lid. The palpebral fissure; the crease of the upper lid and where the lower lid ends; the rim of the orbit.
+constexpr double kFissureX[16] = {-1.50, -1.25, -0.88, -0.42, 0.05, 0.52,  0.94,  1.27,
+                                  1.50,  1.28,  0.96,  0.54,  0.08, -0.40, -0.86, -1.24};
+constexpr double kFissureY[16] = {-0.22, 0.10,  0.38,  0.54,  0.58,  0.55,  0.44,  0.28,
+                                  0.06,  -0.24, -0.45, -0.58, -0.63, -0.60, -0.49, -0.34};
+constexpr double kCreaseX[16] = {-1.67, -1.42, -0.98, -0.45, 0.06, 0.58,  1.08,  1.50,
+                                 1.80,  1.60,  1.18,  0.65,  0.08, -0.48, -1.02, -1.44};
+constexpr double kCreaseY[16] = {-0.20, 0.28,  0.68,  0.90,  0.97,  0.95,  0.82,  0.56,
+                                 0.10,  -0.42, -0.82, -1.04, -1.10, -1.02, -0.80, -0.52};
+constexpr double kOrbitX[16] = {-1.84, -1.68, -1.18, -0.52, 0.08, 0.66,  1.28,  1.82,
+                                2.22,  2.02,  1.45,  0.76,  0.08, -0.60, -1.22, -1.66};
+constexpr double kOrbitY[16] = {-0.20, 0.50,  1.08,  1.36,  1.45,  1.43,  1.27,  0.90,
+                                0.15,  -0.78, -1.36, -1.62, -1.68, -1.58, -1.28, -0.80};
 
-Vec3 onLidSphere(double x, double y, double radius) {
-  const double flat = x * x + y * y;
-  const double r2 = radius * radius;
-  // Near the corners the margin leaves the sphere and runs straight to the corner.
-  const double z2 = r2 - flat;
-  const double floor2 = 0.30 * 0.30;
-  return {x, y, std::sqrt(z2 > floor2 ? z2 : floor2)};
+// On the skin, straight behind (x, y) relative to the eyeball's centre.
+Vec3 lidSkin(double x, double y) {
+  return castToSkin({kEyeCentre.x + x, kEyeCentre.y + y, 16}, {0, 0, -1}) - kEyeCentre;
 }
 
 Vec3 eyePoint(double ring, double around) {
-  const double x = wrappedSpline(kFissureX, around), y = wrappedSpline(kFissureY, around);
-  const Vec3 front = onLidSphere(x, y, kEyeRadius + kLidThickness);
-  const double inner = (kEyeRadius + kLidGap) / (kEyeRadius + kLidThickness);
-  const Vec3 back = front * inner;
-  if (ring <= kLidMarginBack) return kEyeCentre + lerp(front, back, clamp01(ring - kLidMarginFront));
-  // Behind the lids: along the eyeball, away from the opening.
-  const double corner_line =
-      lerp(kFissureY[0], kFissureY[8], clamp01((x - kFissureX[0]) / (kFissureX[8] - kFissureX[0])));
-  const double rise = back.y - corner_line;  // 0 at the corners
-  const Vec3 deep = normalized(Vec3{back.x * 1.12, back.y + 0.7 * rise + 0.25 * std::fmin(1, std::fmax(-1, rise / 0.2)),
-                                    back.z * 0.75}) *
-                    (kEyeRadius + kLidGap + 0.03);
-  Vec3 p = lerp(back, deep, clamp01(ring - kLidMarginBack));
+  const double fx = wrappedSpline(kFissureX, around), fy = wrappedSpline(kFissureY, around);
+  const double cx = wrappedSpline(kCreaseX, around), cy = wrappedSpline(kCreaseY, around);
+  if (ring < kLidMarginFront) {
+    if (ring < kLidCrease) {  // close to the crease the rings are close together
+      const double t = 1 - std::pow(1 - clamp01(ring - kOrbit), 1.5);
+      return kEyeCentre +
+             lidSkin(lerp(wrappedSpline(kOrbitX, around), cx, t), lerp(wrappedSpline(kOrbitY, around), cy, t));
+    }
+    const double t = std::pow(ring - kLidCrease, 1.15);
+    Vec3 p = lidSkin(lerp(cx, fx, t), lerp(cy, fy, t));
+    // The crease itself is a line that goes in.
+    const double upper = smoothstep(0.7, 2.2, around) * (1 - smoothstep(5.8, 7.5, around));
+    p = p - normalized(p) * (0.05 * upper * smoothstep(0.2, 0.0, ring - kLidCrease));
+    return kEyeCentre + p;
+  }
+  const Vec3 front = lidSkin(fx, fy);
   const double keep = kEyeRadius + kLidGap;
+  const Vec3 back = normalized(front) * std::fmax(keep, length(front) - 1.15 * kLidThickness);
+  if (ring <= kLidMarginBack) return kEyeCentre + lerp(front, back, ring - kLidMarginFront);
+  // Behind the lids: along the eyeball, away from the opening's axis. In the corners there is nothing to go behind.
+  const double phase = around / 8 - std::floor(around / 8);
+  const double behind = smoothstep(0.04, 0.22, std::fmin(phase, 1 - phase));
+  const double flat = std::sqrt(back.x * back.x + back.y * back.y),
+               angle = std::atan2(flat, back.z) + 0.03 + 0.34 * behind;
+  const Vec3 deep =
+      Vec3{back.x / flat * std::sin(angle), back.y / flat * std::sin(angle), std::cos(angle)} * (keep + 0.03 * behind);
+  Vec3 p = lerp(back, deep, clamp01(ring - kLidMarginBack));
   if (length(p) < keep) p = normalized(p) * keep;
   return kEyeCentre + p;
 }
@@ -73,12 +91,12 @@ Vec3 eyePoint(double ring, double around) {
 
 constexpr double kMouthGap = 0.005;  // half of the hair's gap between the closed lips
 // 11 knots from the middle of the upper lip over the corner to the middle of the lower lip.
-constexpr double kBorderX[11] = {0.0, 0.50, 1.08, 1.66, 2.16, 2.50, 2.13, 1.62, 1.07, 0.53, 0.0};
-constexpr double kBorderY[11] = {-5.90, -5.76, -5.93, -6.18, -6.40, -6.57, -6.92, -7.25, -7.46, -7.56, -7.58};
-constexpr double kRimX[11] = {0.0, 0.48, 1.0, 1.52, 1.98, 2.32, 1.98, 1.52, 1.0, 0.48, 0.0};
-constexpr double kRimY[11] = {-6.67, -6.63, -6.60, -6.61, -6.62, -6.59, -6.62, -6.61, -6.60, -6.63, -6.67};
-constexpr double kRimBack[11] = {0.20, 0.21, 0.22, 0.22, 0.18, 0.12, 0.18, 0.22, 0.22, 0.20, 0.20};
-constexpr double kFullness[11] = {0.42, 0.4, 0.35, 0.25, 0.12, 0.0, 0.13, 0.29, 0.42, 0.47, 0.49};
+constexpr double kBorderX[11] = {0.0, 0.46, 1.02, 1.60, 2.12, 2.50, 2.12, 1.62, 1.07, 0.53, 0.0};
+constexpr double kBorderY[11] = {-5.98, -5.86, -5.98, -6.18, -6.37, -6.50, -6.86, -7.20, -7.42, -7.52, -7.54};
+constexpr double kRimX[11] = {0.0, 0.48, 1.0, 1.52, 1.98, 2.34, 1.98, 1.52, 1.0, 0.48, 0.0};
+constexpr double kRimY[11] = {-6.69, -6.64, -6.59, -6.60, -6.57, -6.505, -6.58, -6.60, -6.59, -6.64, -6.69};
+constexpr double kRimBack[11] = {0.20, 0.21, 0.22, 0.22, 0.19, 0.15, 0.19, 0.22, 0.22, 0.20, 0.20};
+constexpr double kFullness[11] = {0.42, 0.4, 0.35, 0.25, 0.11, 0.0, 0.11, 0.29, 0.42, 0.47, 0.49};
 
 Vec3 lipBorder(double around) {
   const Vec3 p{spline(kBorderX, around), spline(kBorderY, around), 0};
@@ -104,13 +122,13 @@ Vec3 mouthPoint(double ring, double around) {
     return border * ((1 - t) * (1 - t)) + bulge * (2 * t * (1 - t)) + rim * (t * t);
   }
   // The lips touch for a while, then open into the vestibule, the mouth and the throat.
-  const double spread = std::sqrt(open * (2 - open));
-  const Vec3 contact{rim.x * 0.985, rim.y + up * 0.01 * open, rim.z - 0.30};
+  const double spread = std::pow(open * (2 - open), 0.3);
+  const Vec3 contact{rim.x * 1.0, rim.y + up * 0.01 * open, rim.z - 0.30};
   if (ring <= kMouthVestibule) return lerp(rim, contact, clamp01(ring - kLipRim));
-  const Vec3 middle{rim.x * 1.05, -6.66 + up * (0.10 + (up > 0 ? 1.20 : 1.10) * spread),
-                    rim.z - (up > 0 ? 0.65 : 0.85) - 0.4 * (1 - open)};
+  const Vec3 middle{rim.x * 1.20, -6.66 + up * (0.10 + (up > 0 ? 1.35 : 1.80) * spread),
+                    rim.z - (up > 0 ? 0.65 : 0.95) - 0.4 * (1 - open)};
   if (ring <= 6) return lerp(contact, middle, ring - kMouthVestibule);
-  const Vec3 back{rim.x * 1.0, -6.75 + up * (0.12 + (up > 0 ? 1.3 : 1.5) * spread), 4.6 - 0.4 * spread};
+  const Vec3 back{rim.x * 1.25, -6.75 + up * (0.12 + (up > 0 ? 1.4 : 1.9) * spread), 4.6 - 0.4 * spread};
   return lerp(middle, back, clamp01(ring - 6));
 }
 
@@ -175,10 +193,10 @@ int stripPeriod(Strip strip) {
 }
 
 EarFrame earFrame() {
-  const double flare = 0.33, tilt = 0.16;  // radians: out from the skull, and backward
+  const double flare = 0.30, tilt = 0.16;  // radians: out from the skull, and backward
   const double cf = std::cos(flare), sf = std::sin(flare), ct = std::cos(tilt), st = std::sin(tilt);
   const Vec3 back{sf, 0, -cf}, up{0, 1, 0};
-  return {{6.35, -1.65, 0.45}, back * ct - up * st, up * ct + back * st, {cf, 0, sf}};
+  return {{7.12, -1.65, 0.35}, back * ct - up * st, up * ct + back * st, {cf, 0, sf}};
 }
 
 Vec3 lidMargin(double around) { return eyePoint(kLidMarginFront, around); }

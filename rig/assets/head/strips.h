@@ -10,7 +10,7 @@ namespace volto::head {
 enum class Strip : unsigned char { none, eye, mouth, nostril, ear };
 
 // Eye: around 0 inner corner, 4 middle of the upper lid, 8 outer corner, 12 middle of the lower lid (period 16).
-inline constexpr double kLidMarginFront = 3, kLidMarginBack = 4, kLidPocket = 5;
+inline constexpr double kOrbit = 1, kLidCrease = 2, kLidMarginFront = 3, kLidMarginBack = 4, kLidPocket = 5;
 inline constexpr int kEyeAround = 16;
 // Mouth: around 0 middle of the upper lip, 5 corner, 10 middle of the lower lip (left half, not closed).
 inline constexpr double kLipBorder = 2, kLipRim = 4, kMouthVestibule = 5, kMouthBack = 7;
