@@ -5,8 +5,10 @@
 #include <cmath>
 #include <cstring>
 #include <memory>
+#include <stdexcept>
 
 #include "rig/file_bytes.h"
+#include "rig/motion_file.h"
 #include "rig_file_generated.h"
 
 namespace volto::rig {
@@ -74,6 +76,11 @@ class Decoder {
     operatorRows();
     parts();
     blendshapes();
+    try {
+      decodeMotion(in_.motion(), rig_);
+    } catch (const std::invalid_argument& e) {
+      fail(e.what());
+    }
     return std::move(rig_);
   }
 
@@ -142,6 +149,11 @@ class Decoder {
             "materials do not fit the polygons");
     for (const std::uint32_t material : out.polygon_material)
       require(material < out.materials.size(), "a material that is not there");
+    const auto colours = numbers(m.vertex_colours());
+    requireFinite(colours, "a vertex colour");
+    require(colours.empty() || colours.size() == 3 * out.vertexCount(), "vertex colours do not fit the vertices");
+    for (std::size_t i = 0; i < colours.size(); i += 3)
+      out.vertex_colours.push_back({colours[i], colours[i + 1], colours[i + 2]});
   }
 
   void points() {
@@ -271,8 +283,12 @@ flatbuffers::Offset<file::Mesh> encodeMesh(flatbuffers::FlatBufferBuilder& build
     const auto colour = builder.CreateVector(m.colour.data(), m.colour.size());
     materials.push_back(file::CreateMaterial(builder, name, colour));
   }
-  return file::CreateMesh(builder, positions, corners, start, texcoords, polygon_material,
-                          builder.CreateVector(materials));
+  const auto material_list = builder.CreateVector(materials);
+  std::vector<float> colours;
+  for (const auto& colour : mesh.vertex_colours) colours.insert(colours.end(), colour.begin(), colour.end());
+  const auto vertex_colours = colours.empty() ? 0 : builder.CreateVector(colours);
+  return file::CreateMesh(builder, positions, corners, start, texcoords, polygon_material, material_list,
+                          vertex_colours);
 }
 
 }  // namespace
@@ -321,9 +337,10 @@ std::vector<std::byte> encodeRig(const Rig& rig) {
     shapes.push_back(file::CreateBlendshape(builder, shape_name, displacement, b.moves_mask));
   }
   const auto shape_vector = builder.CreateVector(shapes);
+  const auto motion = encodeMotion(builder, rig);
   file::FinishRigBuffer(builder, file::CreateRig(builder, name, mesh_file, mesh, feature_ids, feature_vertex,
                                                  feature_positions, mesh_from_head, fapu, triangle, kind, region_vector,
-                                                 row_start, point, weight, part_vector, shape_vector));
+                                                 row_start, point, weight, part_vector, shape_vector, motion));
 
   std::array<unsigned char, kHeaderBytes> header{};
   std::memcpy(header.data(), kMagic.data(), kMagic.size());
