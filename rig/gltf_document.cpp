@@ -106,6 +106,8 @@ class Opener {
       json_ = Json::parse(json_text_);
     } catch (const Json::parse_error& error) {
       failAt(json_at_ + error.byte, "the JSON is damaged here");
+    } catch (const Json::exception&) {
+      fail("the JSON holds a number that is too large");
     }
     if (!json_.is_object()) fail("the JSON is no object; is it a glTF file?");
     for (const auto& [key, value] : json_.items()) {

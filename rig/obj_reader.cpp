@@ -256,7 +256,7 @@ class ObjParser {
     if (corners < 3) fail("face with " + std::to_string(corners) + " corners; it needs at least 3");
     if (mesh_.corner_vertices.size() > kMaxCorners) fail("more than 16000000 polygon corners");
     mesh_.polygon_start.push_back(static_cast<std::uint32_t>(mesh_.corner_vertices.size()));
-    if (material_ >= 0 && mesh_.polygon_material.empty())
+    if (material_ >= 0 && mesh_.polygon_material.empty() && mesh_.polygonCount() > 1)
       mesh_.polygon_material.resize(mesh_.polygonCount() - 1, materialIndex(""));
     if (material_ >= 0) mesh_.polygon_material.push_back(static_cast<std::uint32_t>(material_));
     restOfLine();

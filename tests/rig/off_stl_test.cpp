@@ -57,7 +57,7 @@ TEST(Off, LongCommentIsNoTrouble) {
 
 TEST(Off, DamagedFaceIsRefusedWithItsLine) {
   for (const char* face :
-       {"-3 0 1 2", "3 0 1", "3 0 1 3", "3 0 1 -1", "2 0 1", "0", "5000 0 1 2", "3 0 1 x", "3 0 1 1.5"})
+       {"-3 0 1 2", "3 0 1", "3 0 1 3", "3 0 1 -1", "2 0 1", "0 # no corner", "5000 0 1 2", "3 0 1 x", "3 0 1 1.5"})
     EXPECT_NE(offRefused(replaced(kOff, "3 0 1 2", face)).find(":6: "), std::string::npos) << face;
 }
 

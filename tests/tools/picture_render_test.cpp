@@ -317,25 +317,68 @@ TEST(Look, ColourOfTheFileWinsOverTheName) {
   EXPECT_EQ(look.polygon_surface, (std::vector<std::uint16_t>{0, 1}));
 }
 
-TEST(Look, EyeballWithoutMaterialIsKnownByItsShape) {
-  // A large sheet and a small ball before it.
+// A large sheet and a small ball before it; the ball's polygons come first.
+rig::Mesh ballBeforeASheet() {
   rig::Mesh mesh = ballWithNose();
   for (Eigen::Index v = 0; v < mesh.positions.rows(); ++v) {
     Eigen::Vector3d p = mesh.positions.row(v).transpose();
     p.y() /= 1.3;
     mesh.positions.row(v) = p.normalized().transpose();
   }
-  const auto ball_polygons = mesh.polygonCount();
   const auto offset = static_cast<std::uint32_t>(mesh.vertexCount());
   mesh.positions.conservativeResize(mesh.positions.rows() + 3, 3);
   mesh.positions.bottomRows(3) << -20, -20, -3, 20, -20, -3, 0, 20, -3;
   for (std::uint32_t k = 0; k < 3; ++k) mesh.corner_vertices.push_back(offset + k);
   mesh.polygon_start.push_back(static_cast<std::uint32_t>(mesh.corner_vertices.size()));
+  return mesh;
+}
+
+TEST(Look, EyeballWithoutMaterialIsKnownByItsShape) {
+  const rig::Mesh mesh = ballBeforeASheet();
+  const auto ball_polygons = mesh.polygonCount() - 1;
   const Look look = lookOf(mesh);
   ASSERT_EQ(look.eyeballs.size(), 1U);
   EXPECT_NEAR(length(look.eyeballs[0].centre), 0.0F, 0.05F);
   EXPECT_EQ(look.surfaces[look.polygon_surface[0]].eyeball, 0);
   EXPECT_EQ(look.surfaces[look.polygon_surface[ball_polygons]].name, "skin");
+}
+
+TEST(Look, IrisIsPaintedOnlyWhereNoMaterialShowsOne) {
+  rig::Mesh mesh = ballBeforeASheet();
+  mesh.polygon_material.assign(mesh.polygonCount(), 0);
+  mesh.polygon_material.back() = 1;
+  mesh.materials = {{"eye", {0.9F, 0.9F, 0.8F}}, {"skin", {0.24F, 0.55F, 0.42F}}};
+  const Look painted = lookOf(mesh);
+  ASSERT_EQ(painted.eyeballs.size(), 1U);
+  const Surface& eye = painted.surfaces[painted.polygon_surface[0]];
+  EXPECT_EQ(eye.eyeball, 0);
+  EXPECT_FLOAT_EQ(eye.albedo.z, 0.8F) << "the white is the artist's";
+  EXPECT_FLOAT_EQ(painted.surfaces[painted.polygon_surface.back()].albedo.y, 0.55F);
+  mesh.materials.push_back({"iris", {0.7F, 0.4F, 0.1F}});
+  EXPECT_TRUE(lookOf(mesh).eyeballs.empty());
+}
+
+TEST(Look, VertexColoursAreShown) {
+  rig::Mesh mesh = ballBeforeASheet();
+  mesh.vertex_colours.assign(mesh.vertexCount(), {1.0F, 1.0F, 1.0F});
+  EXPECT_FALSE(hasOwnLook(mesh)) << "white for all is what programs write that know no colours";
+  mesh.vertex_colours[0] = {0.5F, 0.25F, 0.125F};
+  ASSERT_TRUE(hasOwnLook(mesh));
+  const Look look = lookOf(mesh);
+  EXPECT_FLOAT_EQ(look.surfaces[0].albedo.y, 1.0F);
+  EXPECT_FLOAT_EQ(look.vertex_tint[0].y, 0.25F);
+  EXPECT_TRUE(look.eyeballs.empty()) << "the colours show the iris, if any";
+}
+
+TEST(Look, MaterialsThatSayNothingCountAsNone) {
+  rig::Mesh mesh = ballBeforeASheet();
+  mesh.polygon_material.assign(mesh.polygonCount(), 0);
+  mesh.materials.resize(1);
+  mesh.materials[0].name = "Material.001";
+  EXPECT_FALSE(hasOwnLook(mesh));
+  EXPECT_EQ(lookOf(mesh).eyeballs.size(), 1U) << "told by its shape";
+  mesh.materials[0].colour = {0.2F, 0.2F, 0.2F};
+  EXPECT_TRUE(hasOwnLook(mesh));
 }
 
 TEST(Look, IrisAndPupilFaceTheAxis) {

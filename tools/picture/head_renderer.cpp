@@ -20,7 +20,7 @@ Vec3 rowOf(const rig::VertexPositions& positions, Eigen::Index row) {
           static_cast<float>(positions(row, 2))};
 }
 
-constexpr int kShadowSize = 512;
+constexpr int kShadowSize = 1024;
 
 }  // namespace
 
@@ -47,7 +47,7 @@ struct HeadRenderer::State {
 
   // The light's own camera: parallel rays.
   Mat3 light_from_view;
-  Vec3 light_low;
+  Vec3 light_low, light_towards;
   float light_scale = 1.0F, light_far = 0.0F;
 };
 
@@ -109,6 +109,7 @@ void HeadRenderer::State::computeNormals() {
 void HeadRenderer::State::castShadow(Vec3 towards) {
   const Vec3 side = normalised(cross(Vec3{0, 1, 0}, towards));
   light_from_view = {side, cross(towards, side), towards};
+  light_towards = towards;
   Vec3 low{1e30F, 1e30F, 1e30F}, high{-1e30F, -1e30F, -1e30F};
   light_screen.resize(view_points.size());
   for (const Vec3 point : view_points) {
@@ -137,13 +138,25 @@ void HeadRenderer::State::castShadow(Vec3 towards) {
 // How much of the key light reaches a point, by comparing with the light's z-buffer around it; softer the wider it
 // looks.
 float HeadRenderer::State::keyLight(Vec3 view_point, Vec3 normal) const {
-  const Vec3 p = light_from_view * (view_point + normal * (0.006F * head_size));
+  // Lifted off the surface, more where the light grazes it: the map's texels are flat steps there.
+  const float grazing = 1.0F - std::clamp(dot(normal, light_towards), 0.0F, 1.0F);
+  const Vec3 p = light_from_view * (view_point + normal * ((0.004F + 0.010F * grazing) * head_size));
   const float x = 1.0F + (p.x - light_low.x) * light_scale, y = 1.0F + (p.y - light_low.y) * light_scale;
-  const float depth = light_far - p.z, soft = 0.012F * head_size;
+  const float depth = light_far - p.z, soft = 0.014F * head_size;
+  // Two rings of a disc: the light is as wide as a window.
+  static const std::array<std::array<float, 2>, 25> kTaps = [] {
+    std::array<std::array<float, 2>, 25> taps{};
+    std::size_t i = 1;
+    for (const auto& [count, radius] : {std::pair{8, 0.5F}, std::pair{16, 1.0F}}) {
+      for (int k = 0; k < count; ++k, ++i) {
+        const double angle = (k + 0.25) * 2.0 * 3.14159265358979 / count;
+        taps[i] = {radius * static_cast<float>(std::cos(angle)), radius * static_cast<float>(std::sin(angle))};
+      }
+    }
+    return taps;
+  }();
+  constexpr float kReach = kShadowSize * 0.011F;
   float lit = 0.0F;
-  constexpr float kReach = 2.2F;
-  constexpr std::array<std::array<float, 2>, 9> kTaps{
-      {{0, 0}, {1, 0}, {-1, 0}, {0, 1}, {0, -1}, {0.7F, 0.7F}, {-0.7F, 0.7F}, {0.7F, -0.7F}, {-0.7F, -0.7F}}};
   for (const auto& tap : kTaps) {
     const int column = std::clamp(static_cast<int>(x + kReach * tap[0]), 0, kShadowSize - 1);
     const int row = std::clamp(static_cast<int>(y + kReach * tap[1]), 0, kShadowSize - 1);

@@ -17,8 +17,8 @@ struct Known {
 
 const Vec3 kSkin{0.57F, 0.315F, 0.22F};
 
-const std::array<Known, 28>& knownSurfaces() {
-  static const std::array<Known, 28> known{{
+const std::array<Known, 30>& knownSurfaces() {
+  static const std::array<Known, 30> known{{
       {"lacrimal", {"lacrimal", {0.6F, 0.4F, 0.35F}, 0.05F, 200.0F, 0.0F, false}},
       {"tear", {"tear", {0.6F, 0.4F, 0.35F}, 0.05F, 200.0F, 0.0F, false}},
       {"occlusion", {"occlusion", {0.1F, 0.08F, 0.08F}, 0.0F, 8.0F, 0.0F, false}},
@@ -26,6 +26,8 @@ const std::array<Known, 28>& knownSurfaces() {
       {"lash", {"eyelashes", {0.022F, 0.016F, 0.013F}, 0.02F, 30.0F}},
       {"brow", {"eyebrows", {0.06F, 0.03F, 0.018F}, 0.02F, 20.0F, 0.3F}},
       {"eyelid", {"skin", kSkin, 0.028F, 22.0F, 1.0F}},
+      {"lid_rim", {"lid_rim", {0.58F, 0.28F, 0.22F}, 0.045F, 90.0F, 0.9F}},
+      {"nostril", {"nostril", {0.16F, 0.06F, 0.05F}, 0.02F, 20.0F, 0.6F}},
       {"iris", {"iris", {0.10F, 0.17F, 0.22F}, 0.05F, 220.0F}},
       {"pupil", {"pupil", {0.004F, 0.004F, 0.004F}, 0.05F, 260.0F}},
       {"eye_white", {"eye_white", {0.74F, 0.71F, 0.69F}, 0.05F, 220.0F, 0.3F}},
@@ -121,27 +123,33 @@ void fitSphere(const rig::Mesh& mesh, Component& part) {
   part.ball = octants == 255 && spread < 0.08 * radius;
 }
 
-// Parts of a mesh without materials, told by their shape.
-Look lookByShape(const rig::Mesh& mesh) {
-  Look look;
-  look.surfaces = {surfaceByName("skin"), surfaceByName("eyeball"), surfaceByName("tear"), surfaceByName("teeth")};
-  look.polygon_surface.assign(mesh.polygonCount(), 0);
-  const std::vector<std::uint32_t> component = rig::connectedComponents(mesh);
+// Eyeballs of a mesh and films over them, told by their shape.
+struct Eyes {
+  std::vector<std::uint32_t> component;  // of every vertex
+  std::vector<Eyeball> balls;
+  std::vector<int> ball_of;  // of components: index into balls, -1
+  std::vector<bool> film;    // of components: lies on a ball all over (tear fluid, painted shadow) and would hide it
+};
+
+Eyes findEyes(const rig::Mesh& mesh) {
+  Eyes eyes;
+  eyes.component = rig::connectedComponents(mesh);
   std::vector<Component> parts;
-  for (std::uint32_t v = 0; v < component.size(); ++v) {
-    if (component[v] >= parts.size()) parts.resize(component[v] + 1U);
-    Component& part = parts[component[v]];
+  for (std::uint32_t v = 0; v < eyes.component.size(); ++v) {
+    if (eyes.component[v] >= parts.size()) parts.resize(eyes.component[v] + 1U);
+    Component& part = parts[eyes.component[v]];
     const Vec3 p = position(mesh, v);
     if (!std::isfinite(p.x + p.y + p.z)) continue;
     part.vertices.push_back(v);
     part.low = {std::min(part.low.x, p.x), std::min(part.low.y, p.y), std::min(part.low.z, p.z)};
     part.high = {std::max(part.high.x, p.x), std::max(part.high.y, p.y), std::max(part.high.z, p.z)};
   }
-  if (parts.empty()) return look;
+  eyes.ball_of.assign(parts.size(), -1);
+  eyes.film.assign(parts.size(), false);
+  if (parts.empty()) return eyes;
   const auto size = [](const Component& part) { return part.vertices.empty() ? 0.0F : length(part.high - part.low); };
   const float head = size(*std::max_element(parts.begin(), parts.end(),
                                             [&](const Component& a, const Component& b) { return size(a) < size(b); }));
-  std::vector<std::uint16_t> surface_of(parts.size(), 0);
   std::vector<std::size_t> balls;
   for (std::size_t i = 0; i < parts.size(); ++i) {
     if (parts[i].vertices.size() < 24 || size(parts[i]) > 0.4F * head) continue;
@@ -149,15 +157,12 @@ Look lookByShape(const rig::Mesh& mesh) {
     if (parts[i].ball && parts[i].radius > 0.01F * head) balls.push_back(i);
   }
   for (const std::size_t i : balls) {
-    Surface eye = surfaceByName("eyeball");
-    eye.eyeball = static_cast<int>(look.eyeballs.size());
-    look.eyeballs.push_back({parts[i].centre, {0.0F, 0.0F, 1.0F}});
-    surface_of[i] = static_cast<std::uint16_t>(look.surfaces.size());
-    look.surfaces.push_back(eye);
+    eyes.ball_of[i] = static_cast<int>(eyes.balls.size());
+    eyes.balls.push_back({parts[i].centre, {0.0F, 0.0F, 1.0F}});
   }
-  // A film over an eyeball (tear fluid, painted shadow) would hide it: no point of it is far from the ball's surface.
+  // A film: no point of it is far from the ball's surface.
   for (std::size_t i = 0; i < parts.size(); ++i) {
-    if (surface_of[i] != 0 || parts[i].vertices.empty()) continue;
+    if (eyes.ball_of[i] >= 0 || parts[i].vertices.empty()) continue;
     for (const std::size_t ball : balls) {
       bool film = true;
       for (const std::uint32_t v : parts[i].vertices) {
@@ -165,13 +170,83 @@ Look lookByShape(const rig::Mesh& mesh) {
         film = film && distance > 0.85F && distance < 1.25F;
         if (!film) break;
       }
-      if (film) surface_of[i] = 2;
+      if (film) eyes.film[i] = true;
     }
   }
-  for (std::size_t p = 0; p < mesh.polygonCount(); ++p) {
-    look.polygon_surface[p] = surface_of[component[mesh.corner_vertices[mesh.polygon_start[p]]]];
+  return eyes;
+}
+
+std::size_t componentOf(const rig::Mesh& mesh, const Eyes& eyes, std::size_t polygon) {
+  return eyes.component[mesh.corner_vertices[mesh.polygon_start[polygon]]];
+}
+
+// Parts of a mesh that says nothing about itself.
+Look lookByShape(const rig::Mesh& mesh) {
+  Look look;
+  look.surfaces = {surfaceByName("skin"), surfaceByName("eyeball"), surfaceByName("tear"), surfaceByName("teeth")};
+  Eyes eyes = findEyes(mesh);
+  const std::size_t first_ball = look.surfaces.size();
+  for (std::size_t ball = 0; ball < eyes.balls.size(); ++ball) {
+    Surface eye = surfaceByName("eyeball");
+    eye.eyeball = static_cast<int>(ball);
+    look.surfaces.push_back(eye);
   }
+  look.polygon_surface.reserve(mesh.polygonCount());
+  for (std::size_t p = 0; p < mesh.polygonCount(); ++p) {
+    const std::size_t component = componentOf(mesh, eyes, p);
+    const int ball = eyes.ball_of[component];
+    look.polygon_surface.push_back(ball >= 0 ? static_cast<std::uint16_t>(first_ball + static_cast<std::size_t>(ball))
+                                             : static_cast<std::uint16_t>(eyes.film[component] ? 2 : 0));
+  }
+  look.eyeballs = std::move(eyes.balls);
   return look;
+}
+
+bool isUnset(const rig::Mesh::Material& material) { return material.colour == rig::Mesh::Material{}.colour; }
+
+const Known* known(std::string_view name) {
+  std::string lower(name);
+  for (char& c : lower) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  for (const Known& one : knownSurfaces()) {
+    if (lower.find(one.part) != std::string::npos) return &one;
+  }
+  return nullptr;
+}
+
+// Some programs write white for every vertex.
+bool hasVertexColours(const rig::Mesh& mesh) {
+  if (mesh.vertex_colours.size() != mesh.vertexCount()) return false;
+  for (const auto& colour : mesh.vertex_colours)
+    if (colour != mesh.vertex_colours.front()) return true;
+  return false;
+}
+
+// Iris and pupil on balls of a mesh whose materials name an eye but not its parts.
+void paintEyes(const rig::Mesh& mesh, Look& look) {
+  for (const auto& material : mesh.materials) {
+    const Known* kind = known(material.name);
+    if (kind != nullptr && (kind->part == "iris" || kind->part == "pupil")) return;
+  }
+  Eyes eyes = findEyes(mesh);
+  if (eyes.balls.empty()) return;
+  const std::size_t first_ball = look.surfaces.size();
+  for (std::size_t ball = 0; ball < eyes.balls.size(); ++ball) {
+    Surface eye = surfaceByName("eyeball");
+    eye.eyeball = static_cast<int>(ball);
+    look.surfaces.push_back(eye);
+  }
+  for (std::size_t p = 0; p < mesh.polygonCount(); ++p) {
+    const int ball = eyes.ball_of[componentOf(mesh, eyes, p)];
+    if (ball < 0) continue;
+    Surface& eye = look.surfaces[first_ball + static_cast<std::size_t>(ball)];
+    const Surface& from = look.surfaces[look.polygon_surface[p]];
+    // The white is the material's where that is bright enough to be one.
+    if (std::min({from.albedo.x, from.albedo.y, from.albedo.z}) > 0.45F) eye.albedo = from.albedo;
+    look.polygon_surface[p] = static_cast<std::uint16_t>(first_ball + static_cast<std::size_t>(ball));
+  }
+  look.eyeballs = std::move(eyes.balls);
 }
 
 }  // namespace
@@ -199,30 +274,47 @@ void checkDrawable(const rig::Mesh& mesh) {
 }
 
 Surface surfaceByName(std::string_view name) {
-  std::string lower(name);
-  for (char& c : lower) {
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  }
-  for (const Known& known : knownSurfaces()) {
-    if (lower.find(known.part) != std::string::npos) return known.surface;
-  }
-  return {"skin", kSkin, 0.028F, 22.0F, 1.0F};
+  const Known* kind = known(name);
+  return kind != nullptr ? kind->surface : Surface{"skin", kSkin, 0.028F, 22.0F, 1.0F};
+}
+
+bool hasOwnLook(const rig::Mesh& mesh) {
+  if (hasVertexColours(mesh)) return true;
+  if (mesh.polygon_material.size() != mesh.polygonCount()) return false;
+  for (const auto& material : mesh.materials)
+    if (!isUnset(material) || known(material.name) != nullptr) return true;
+  return false;
 }
 
 Look lookOf(const rig::Mesh& mesh) {
   checkDrawable(mesh);
-  if (mesh.materials.empty() || mesh.polygon_material.size() != mesh.polygonCount()) return lookByShape(mesh);
+  if (!hasOwnLook(mesh)) return lookByShape(mesh);
+  const bool coloured = hasVertexColours(mesh);
   Look look;
-  const std::array<float, 3> unset = rig::Mesh::Material{}.colour;
-  for (const auto& material : mesh.materials) {
-    Surface surface = surfaceByName(material.name);
-    surface.name = material.name;
-    if (material.colour != unset) surface.albedo = {material.colour[0], material.colour[1], material.colour[2]};
-    look.surfaces.push_back(surface);
+  if (mesh.polygon_material.size() != mesh.polygonCount() || mesh.materials.empty()) {
+    look.surfaces = {surfaceByName("skin")};
+    look.surfaces[0].albedo = {1.0F, 1.0F, 1.0F};
+    look.polygon_surface.assign(mesh.polygonCount(), 0);
+  } else {
+    for (const auto& material : mesh.materials) {
+      Surface surface = surfaceByName(material.name);
+      surface.name = material.name;
+      if (!isUnset(material))
+        surface.albedo = {material.colour[0], material.colour[1], material.colour[2]};
+      else if (coloured)
+        surface.albedo = {1.0F, 1.0F, 1.0F};
+      look.surfaces.push_back(surface);
+    }
+    look.polygon_surface.reserve(mesh.polygonCount());
+    for (const std::uint32_t index : mesh.polygon_material) {
+      look.polygon_surface.push_back(static_cast<std::uint16_t>(index < mesh.materials.size() ? index : 0));
+    }
   }
-  look.polygon_surface.reserve(mesh.polygonCount());
-  for (const std::uint32_t index : mesh.polygon_material) {
-    look.polygon_surface.push_back(static_cast<std::uint16_t>(index < mesh.materials.size() ? index : 0));
+  if (coloured) {
+    look.vertex_tint.reserve(mesh.vertexCount());
+    for (const auto& c : mesh.vertex_colours) look.vertex_tint.push_back({c[0], c[1], c[2]});
+  } else {
+    paintEyes(mesh, look);
   }
   return look;
 }

@@ -45,10 +45,13 @@ void checkDrawable(const rig::Mesh& mesh);
 // ...; matched inside the name, upper and lower case alike). Skin for a name that says nothing.
 Surface surfaceByName(std::string_view name);
 
-// The mesh's materials: their own colour where the file gives one, else by name. A mesh without materials: skin, with
-// separate components told by their shape (eyeballs get an iris that looks along +z; thin films over them are left
-// out).
-// Throws as checkDrawable does.
+// Whether the mesh says itself what it looks like: materials with a colour or a telling name, or vertex colours.
+bool hasOwnLook(const rig::Mesh& mesh);
+
+// The mesh's materials: their own colour where the file gives one, else by name; vertex colours multiply them, or stand
+// for them where there are none. A mesh that says nothing (hasOwnLook): skin, with separate components told by their
+// shape (thin films over eyeballs are left out). Eyeballs on which no material or vertex colour shows an iris get one
+// painted, that looks along +z. Throws as checkDrawable does.
 Look lookOf(const rig::Mesh& mesh);
 
 }  // namespace volto::picture

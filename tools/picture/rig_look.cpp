@@ -110,8 +110,6 @@ Vec3 toVec3(const Eigen::Vector3d& p) {
 void nameParts(const rig::Rig& rig, Look& look) {
   std::vector<int> surface_of(rig.neutral.vertexCount(), -1);
   const float eye_separation = static_cast<float>(rig.fapu.fapu.eye_separation);
-  const Vec3 forward = toVec3(rig.mesh_from_head.col(2));
-  for (Eyeball& eye : look.eyeballs) eye.axis = forward;
   for (const rig::RigidPart& part : rig.rigid_parts) {
     Surface surface = surfaceByName(part.name);
     if (part.name.find("gums") != std::string::npos) surface = surfaceByName("gums");
@@ -152,7 +150,10 @@ void nameParts(const rig::Rig& rig, Look& look) {
 
 Look lookOfRig(const rig::Rig& rig) {
   Look look = lookOf(rig.neutral);
-  if (!rig.neutral.materials.empty() || !(rig.fapu.fapu.eye_separation > 0.0)) return look;
+  if (!(rig.fapu.fapu.eye_separation > 0.0)) return look;
+  const Vec3 forward = toVec3(rig.mesh_from_head.col(2));
+  for (Eyeball& eye : look.eyeballs) eye.axis = forward;
+  if (hasOwnLook(rig.neutral)) return look;
   nameParts(rig, look);
   const Painter painter(rig);
   look.vertex_tint.assign(rig.neutral.vertexCount(), Vec3{1.0F, 1.0F, 1.0F});

@@ -41,45 +41,55 @@ float smooth(float from, float to, float x) {
 }  // namespace
 
 LightSet lightSet(Lighting lighting) {
+  // A warm key from above the viewer's left shoulder, a cool fill a third as strong, and two lights from behind that
+  // draw the outline.
   static const std::array<Light, 4> studio{{
-      {unit(-0.55F, 0.62F, 0.72F), Vec3{1.0F, 0.955F, 0.89F} * 1.62F},
-      {unit(0.85F, 0.10F, 0.62F), Vec3{0.80F, 0.90F, 1.0F} * 0.42F},
-      {unit(0.75F, 0.35F, -0.62F), Vec3{0.78F, 0.88F, 1.0F} * 1.25F},
-      {unit(-0.85F, 0.25F, -0.55F), Vec3{0.95F, 0.92F, 1.0F} * 0.55F},
+      {unit(-0.52F, 0.58F, 0.80F), Vec3{1.0F, 0.95F, 0.89F} * 1.30F},
+      {unit(0.85F, 0.05F, 0.70F), Vec3{0.93F, 0.95F, 1.0F} * 0.34F},
+      {unit(0.80F, 0.40F, -0.62F), Vec3{0.84F, 0.91F, 1.0F} * 1.00F},
+      {unit(-0.90F, 0.30F, -0.50F), Vec3{1.0F, 0.95F, 0.94F} * 0.50F},
   }};
   static const std::array<Light, 3> frontal{{
-      {unit(0.0F, 0.55F, 0.85F), Vec3{1.0F, 0.97F, 0.93F} * 1.7F},
+      {unit(0.0F, 0.55F, 0.85F), Vec3{1.0F, 0.97F, 0.93F} * 1.55F},
       {unit(0.85F, 0.1F, 0.4F), Vec3{0.9F, 0.95F, 1.0F} * 0.3F},
       {unit(-0.85F, 0.1F, 0.4F), Vec3{0.9F, 0.95F, 1.0F} * 0.3F},
   }};
-  const Vec3 sky{0.34F, 0.36F, 0.40F}, ground{0.17F, 0.14F, 0.13F};
+  const Vec3 sky{0.255F, 0.255F, 0.265F}, ground{0.155F, 0.118F, 0.10F};
   if (lighting == Lighting::frontal) return {frontal, sky, ground};
   return {studio, sky, ground};
 }
 
 Vec3 shade(const Surface& surface, Vec3 albedo, Vec3 normal, Vec3 to_viewer, const LightSet& lights, float open,
            float lit) {
-  // In skin, red light wanders farthest: it reaches around the edge of the shadow.
-  const Vec3 wrap = Vec3{0.34F, 0.17F, 0.12F} * surface.softness;
+  // In skin, light wanders, and the colour that it keeps wanders farthest: red in a person's skin, green in a green
+  // one's. It reaches around the edge of the shadow, and it is what lights the folds from within.
+  const float brightest = std::max({albedo.x, albedo.y, albedo.z, 1e-4F});
+  const Vec3 kept = albedo * (1.0F / brightest), wander = kept * kept * surface.softness;
+  const Vec3 wrap = Vec3{0.09F, 0.09F, 0.09F} * surface.softness + wander * 0.24F;
   const float facing = std::clamp(dot(normal, to_viewer), 0.0F, 1.0F);
   const float away = 1.0F - facing;
-  const float fresnel = surface.specular + (1.0F - surface.specular) * 0.35F * power(away, 5.0F);
+  const float fresnel = surface.specular + (1.0F - surface.specular) * 0.30F * power(away, 5.0F);
   Vec3 diffuse = mix(lights.ground, lights.sky, 0.5F + 0.5F * normal.y);
-  // What is dark by occlusion in skin is lit by red light from within.
-  const Vec3 opened{lifted(open, 0.6F * surface.softness), open, open};
+  const Vec3 opened{lifted(open, 0.55F * wander.x), lifted(open, 0.55F * wander.y), lifted(open, 0.55F * wander.z)};
   diffuse = diffuse * opened;
   Vec3 mirror{};
   bool key = true;
   for (const Light& light : lights.lights) {
     const float cosine = dot(normal, light.towards);
-    const float reach = key ? lit : 0.35F + 0.65F * open;
+    const float reach = key ? lit : 0.30F + 0.70F * open;
     const auto lambert = [&](float w) { return std::max(0.0F, cosine + w) / ((1.0F + w) * (1.0F + 0.5F * w)); };
     const Vec3 soft_reach =
-        key ? Vec3{lifted(reach, 0.7F * surface.softness), reach, reach} : Vec3{reach, reach, reach};
+        key ? Vec3{lifted(reach, 0.40F * wander.x), lifted(reach, 0.40F * wander.y), lifted(reach, 0.40F * wander.z)}
+            : Vec3{reach, reach, reach};
     diffuse = diffuse + light.colour * Vec3{lambert(wrap.x), lambert(wrap.y), lambert(wrap.z)} * soft_reach;
     if (cosine > 0.0F) {
       const Vec3 half = normalised(light.towards + to_viewer);
-      const float highlight = power(std::max(0.0F, dot(normal, half)), surface.gloss) * (surface.gloss + 8.0F) * 0.125F;
+      const float cosine_half = std::max(0.0F, dot(normal, half));
+      // Skin shines in two ways: broadly by its down, narrowly by its oil. Wet and smooth things have the narrow one
+      // alone.
+      const auto lobe = [&](float gloss) { return power(cosine_half, gloss) * (gloss + 8.0F) * 0.125F; };
+      const float broad = 0.55F * surface.softness;
+      const float highlight = (1.0F - broad) * lobe(surface.gloss) + broad * lobe(0.4F * surface.gloss);
       mirror = mirror + light.colour * (highlight * fresnel * std::min(1.0F, 4.0F * cosine) * reach);
     }
     key = false;
@@ -108,7 +118,7 @@ Vec3 eyeballAlbedo(const Eyeball& eyeball, Vec3 white, Vec3 from_centre) {
 }
 
 Vec3 toneMapped(Vec3 light) {
-  const auto curve = [](float x) { return x * (1.0F + x * 0.10F) / (1.0F + 0.55F * x); };
+  const auto curve = [](float x) { return x * (1.0F + x * 0.10F) / (1.0F + 0.45F * x); };
   return {std::min(1.0F, curve(light.x)), std::min(1.0F, curve(light.y)), std::min(1.0F, curve(light.z))};
 }
 
