@@ -79,6 +79,7 @@ class CameraSource final : public ImageSource {
 
   // Pictures.
   bool takeNewest(Image& out);
+  void fail(int error);
   bool decode(const Dequeued& buffer, Image& out);
   void countCorrupt(std::string_view why);
   void watch(std::int64_t now_ns);
@@ -112,6 +113,7 @@ class CameraSource final : public ImageSource {
   std::string corrupt_why_;
   int spurious_ = 0;  // wake-ups without a buffer
   int errors_ = 0;    // of poll, without one of DQBUF
+  int pending_error_ = 0;
   std::array<std::int64_t, kRestarts> restarts_ns_{};
   int restart_count_ = 0;
 
@@ -180,8 +182,7 @@ void CameraSource::startStream(const std::vector<PixelFormat>& offered) {
   if (error != 0) throw DeviceError(path_ + " " + queue_.problem() + "; plug it in again or use another camera");
   clock_.startStream();
   last_arrival_ns_ = system_.nowNs();
-  corrupt_in_a_row_ = 0;
-  spurious_ = 0;
+  corrupt_in_a_row_ = spurious_ = errors_ = pending_error_ = 0;
 }
 
 void CameraSource::closeDevice() {
@@ -230,7 +231,7 @@ void CameraSource::restart(const std::string& why) {
   }
   clock_.startStream();
   last_arrival_ns_ = system_.nowNs();
-  corrupt_in_a_row_ = 0;
+  corrupt_in_a_row_ = spurious_ = errors_ = pending_error_ = 0;
 }
 
 void CameraSource::tryAgain() {
@@ -288,6 +289,10 @@ Next CameraSource::next(Image& out, std::chrono::nanoseconds timeout) {
 
 bool CameraSource::takeNewest(Image& out) {
   const std::int64_t waited_ns = system_.nowNs() - last_look_ns_;
+  if (const int error = std::exchange(pending_error_, 0); error != 0) {
+    fail(error);
+    return false;
+  }
   std::optional<Dequeued> newest;
   std::uint64_t newest_seq = 0;
   int error = 0;
@@ -327,13 +332,19 @@ bool CameraSource::takeNewest(Image& out) {
     const int back = queue_.queue(newest->index);
     if (error == 0 || error == -EAGAIN) error = back != 0 ? back : error;
   }
-  // A picture that was got is given; what is wrong shows again at the next look.
-  if (error == 0 || error == -EAGAIN || got) return got;
+  if (error == 0 || error == -EAGAIN) return got;
+  if (got)
+    pending_error_ = error;  // the picture is given first
+  else
+    fail(error);
+  return got;
+}
+
+void CameraSource::fail(int error) {
   if (error == -ENODEV || error == -ENXIO || error == -EBADF)
     lose(info_.name + " is gone; waiting for it to come back");
   else
     restart(std::string("fails: ") + std::strerror(-error));
-  return false;
 }
 
 bool CameraSource::decode(const Dequeued& buffer, Image& out) {

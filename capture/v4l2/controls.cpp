@@ -138,7 +138,7 @@ void setControls(const Handle& handle, const std::string& path,
       throw DeviceError(path + " has no control " + name + "; it has " + (names.empty() ? "none" : names));
     }
     if (!control->writable) throw DeviceError(path + ": control " + control->name + " can only be read");
-    if (value < control->minimum || value > control->maximum)
+    if (control->kind != "button" && (value < control->minimum || value > control->maximum))
       throw DeviceError(path + ": control " + control->name + " goes from " + std::to_string(control->minimum) +
                         " to " + std::to_string(control->maximum) + ", not to " + std::to_string(value));
     v4l2_control request{control->id, value};
