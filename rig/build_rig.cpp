@@ -7,6 +7,7 @@
 
 #include "rig/association.h"
 #include "rig/closest_point.h"
+#include "rig/corrections.h"
 #include "rig/find_contacts.h"
 #include "rig/head_frame.h"
 #include "rig/part_motion.h"
@@ -256,6 +257,7 @@ Rig buildRig(const Mesh& neutral, const FeaturePointChoices& points, const RigOp
   rig.region_of_influence = regionsOfInfluence().points;
   rig.blendshapes = arkitBlendshapes(rig);
   rig.part_motions = partMotions(rig);
+  makeCorrections(rig, skin);
   return rig;
 }
 

@@ -61,7 +61,8 @@ std::vector<flatbuffers::Offset<file::Combination>> encodeCombinations(flatbuffe
     const auto name = builder.CreateString(combination.name);
     const auto shapes = builder.CreateVector(shape);
     const auto halves = builder.CreateVector(halfway);
-    out.push_back(file::CreateCombination(builder, name, shapes, halves, encode(builder, combination.correction)));
+    out.push_back(file::CreateCombination(builder, name, shapes, halves, encode(builder, combination.correction),
+                                          static_cast<std::uint8_t>(combination.rule)));
   }
   return out;
 }
@@ -123,6 +124,8 @@ void decodeCombinations(const file::Motion& in, Rig& rig) {
     require(shape.size() == halfway.size(), "a combination's drivers do not fit together");
     for (std::size_t i = 0; i < shape.size(); ++i) out.drivers.push_back({shape[i], halfway[i] != 0});
     out.correction = decode(combination->correction());
+    require(combination->rule() <= 1, "a combination of an unknown kind");
+    out.rule = static_cast<Combination::Rule>(combination->rule());
     rig.combinations.push_back(std::move(out));
   }
 }

@@ -20,6 +20,8 @@ void add(const SparseDisplacement& correction, float weight, std::span<Position>
 }
 
 float weightOf(const Combination& combination, std::span<const float> weights) {
+  if (combination.rule == Combination::Rule::excess)
+    return std::max(0.0F, weights[combination.drivers[0].shape] - weights[combination.drivers[1].shape]);
   float product = 1;
   for (const Combination::Driver& driver : combination.drivers) {
     const float w = weights[driver.shape];
@@ -190,6 +192,8 @@ void checkPoseData(const Rig& rig) {
     const std::string what = "combination " + combination.name;
     checkCorrection(combination.correction, vertices, what);
     if (combination.drivers.empty()) refuse(what + " has no drivers");
+    if (combination.rule == Combination::Rule::excess && combination.drivers.size() != 2)
+      refuse(what + " compares other than two shapes");
     for (const Combination::Driver& driver : combination.drivers)
       if (driver.shape >= rig.blendshapes.size()) refuse(what + " is driven by a shape that is not there");
   }

@@ -57,14 +57,18 @@ struct Blendshape {
   SparseDisplacement correction;           // what 84 points cannot say; added at the shape's weight
 };
 
-// A correction for shapes that act together, or for the way of one shape between its ends. Its weight is the product over its
-// drivers of the shape's weight w, or of 4 w (1 - w) for a driver that is `halfway`.
+// A correction for shapes that act together, or for the way of one shape between its ends.
 struct Combination {
+  enum class Rule : std::uint8_t {
+    product = 0,  // its weight is the product over its drivers of the shape's weight w, or of 4 w (1 - w) for one that is `halfway`
+    excess = 1,   // two drivers: by how much the first one's weight exceeds the second's, never below 0
+  };
   struct Driver {
     std::uint16_t shape = 0;               // index into Rig::blendshapes
     bool halfway = false;
   };
   std::string name;
+  Rule rule = Rule::product;
   std::vector<Driver> drivers;             // at least one
   SparseDisplacement correction;
 };

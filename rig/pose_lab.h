@@ -1,0 +1,57 @@
+// Poses of a character while it is being rigged: with a correction that is still being made, and with what is wrong
+// with the result. Internal to rig/.
+#pragma once
+
+#include <array>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "rig/pose.h"
+#include "rig/skin.h"
+
+namespace volto::rig {
+
+// A displacement of every vertex.
+using DenseDisplacement = std::vector<Eigen::Vector3f>;
+
+class PoseLab {
+ public:
+  // Borrows both; what the rig gains later (corrections, combinations) counts from the next setWeights() on.
+  PoseLab(const Rig& rig, const Skin& skin);
+
+  // The pose under work: one weight per blendshape. evaluate() adds `extra` before contacts and fills positions().
+  void setWeights(std::span<const float> weights);
+  const std::vector<Position>& evaluate(const DenseDisplacement& extra);
+  const std::vector<Position>& positions() const { return positions_; }
+  const std::vector<Position>& beforeContacts() const { return base_; }
+  const std::vector<Position>& neutral() const { return neutral_; }
+
+  // Vertices (standing ones) of triangles, both ways to cut a quad, that turned by nearly a right angle or lost nearly
+  // all of their area.
+  std::vector<std::uint32_t> foldedVertices() const;
+
+  // Relaxes the displacement around folds until there are none, or for a while: what it takes is added to `extra`.
+  // Returns whether no fold is left.
+  bool unfold(DenseDisplacement& extra);
+
+  DenseDisplacement nothing() const { return DenseDisplacement(neutral_.size(), Eigen::Vector3f::Zero()); }
+  // Without what could not be seen.
+  SparseDisplacement sparse(const DenseDisplacement& dense) const;
+
+  Eigen::Vector3f at(std::uint32_t v) const { return Eigen::Map<const Eigen::Vector3f>(positions_[v].data()); }
+  Eigen::Vector3f rest(std::uint32_t v) const { return Eigen::Map<const Eigen::Vector3f>(neutral_[v].data()); }
+
+ private:
+  const Rig& rig_;
+  const Skin& skin_;
+  float es_;
+  std::vector<Position> neutral_, base_, positions_;
+  std::vector<std::array<std::uint32_t, 3>> triangles_;
+  std::vector<Eigen::Vector3f> rest_normal_;
+  std::vector<bool> free_;  // skin that may be corrected
+};
+
+}  // namespace volto::rig
