@@ -5,29 +5,14 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "capture/detection/face_detector.h"
 #include "capture/detection/landmark_model.h"
+#include "capture/face_choice.h"
 #include "capture/image.h"
 #include "frames/landmark_frame.h"
 
 namespace volto::capture {
-
-// Which face, where there are several.
-struct FaceChoice {
-  enum class Kind : std::uint8_t {
-    in_front,   // the largest: the nearest to the camera
-    number,     // counted from the left of the image, from 1
-    nearest_to  // a place, as fractions of the image
-  } kind = Kind::in_front;
-  int number = 1;
-  float x = 0.5F, y = 0.5F;
-};
-// "front", "2", "0.25,0.5". Throws std::invalid_argument with one line for people.
-FaceChoice parseFaceChoice(const std::string& text);
 
 struct FaceFinderOptions {
   FaceChoice choice;
