@@ -11,6 +11,7 @@
 #include "rig/fitting/landmark_checks.h"
 #include "rig/fitting/registration.h"
 #include "rig/fitting/target_surface.h"
+#include "rig/fitting/visible_triangles.h"
 #include "rig/skin.h"
 #include "rig/weld.h"
 
@@ -77,11 +78,19 @@ class Target {
   bool insideOut() const { return inside_out_; }
   const std::vector<PlacedLandmark>& landmarks() const { return landmarks_; }
 
-  TargetSurface inFrameOf(const Similarity& mesh_from_generic) const {
+  // `outside`: only what is seen from outside.
+  TargetSurface inFrameOf(const Similarity& mesh_from_generic, bool outside) const {
     VertexPositions positions(mesh_.positions.rows(), 3);
     for (Eigen::Index v = 0; v < positions.rows(); ++v)
       positions.row(v) = mesh_from_generic.inverse(mesh_.positions.row(v)).transpose();
-    return {std::move(positions), triangles_};
+    if (!outside) return {std::move(positions), triangles_};
+    const std::vector<bool> visible = visibleTriangles(positions, triangles_);
+    std::vector<std::array<std::uint32_t, 3>> seen;
+    for (std::size_t t = 0; t < triangles_.size(); ++t)
+      if (visible[t]) seen.push_back(triangles_[t]);
+    if (seen.empty())
+      throw InputError("nothing of the mesh is seen from where the feature points say that its face is");
+    return {std::move(positions), std::move(seen)};
   }
 
  private:
@@ -193,16 +202,16 @@ FeaturePointChoice choiceFor(std::size_t p, const TargetSurface& target, const S
 
 std::vector<CorrespondingPlace> denseCorrespondence(const GenericHead& head, const VertexPositions& start,
                                                     const LandmarkWarp& warp, const RegisteredFace& face,
-                                                    const TargetSurface& target) {
+                                                    const TargetSurface& target, const TargetSurface& all_skin) {
   std::vector<CorrespondingPlace> out(head.mesh.vertexCount());
-  const auto set = [&](std::size_t v, const SurfaceHit& hit) {
+  const auto set = [&](std::size_t v, const TargetSurface& surface, const SurfaceHit& hit) {
     if (hit.triangle < 0) return;
-    out[v] = {placeOf(target, hit), hit.distance, 1 / (1 + std::pow(hit.distance / 0.05, 2))};
+    out[v] = {placeOf(surface, hit), hit.distance, 1 / (1 + std::pow(hit.distance / 0.05, 2))};
   };
   std::vector<bool> done(out.size(), false);
   for (std::size_t v = 0; v < head.vertex_of_face.size(); ++v) {
     done[head.vertex_of_face[v]] = true;
-    set(head.vertex_of_face[v], face.hits[v]);
+    set(head.vertex_of_face[v], target, face.hits[v]);
   }
   // The rest of the skin goes on as the face does.
   constexpr std::size_t kSamples = 150;
@@ -224,7 +233,7 @@ std::vector<CorrespondingPlace> denseCorrespondence(const GenericHead& head, con
   const VertexPositions normals = faceNormals(triangulate(head.mesh), all);
   for (Eigen::Index v = 0; v < all.rows(); ++v)
     if (!done[static_cast<std::size_t>(v)] && head.skin[static_cast<std::size_t>(v)])
-      set(static_cast<std::size_t>(v), target.find(all.row(v), normals.row(v), 0.2, 0.3));
+      set(static_cast<std::size_t>(v), all_skin, all_skin.find(all.row(v), normals.row(v), 0.2, 0.3));
   return out;
 }
 
@@ -234,8 +243,8 @@ FittedPoints fitPoints(const Mesh& mesh, const FeaturePointChoices& given, std::
                        const FitOptions& options) {
   requireUsable(mesh, given, rough);
   const Target on_mesh(mesh, given, rough);
-  const GenericHead& head = genericHead();
-  const HumanFace& human = options.human_face != nullptr ? *options.human_face : humanFace();
+  const GenericHead& head = options.head != nullptr ? *options.head : genericHead();
+  const HumanFace& human = head.human;
 
   FeaturePointPositions generic_normals;
   const std::vector<std::array<std::uint32_t, 3>> face_triangles = triangulate(head.face);
@@ -248,7 +257,7 @@ FittedPoints fitPoints(const Mesh& mesh, const FeaturePointChoices& given, std::
   FacePlacement placed = placeFace(landmarks, human.points, generic_normals, on_mesh.insideOut());
   const Similarity& frame = placed.mesh_from_generic;
   out.notes = std::move(placed.notes);
-  const TargetSurface target = on_mesh.inFrameOf(frame);
+  const TargetSurface target = on_mesh.inFrameOf(frame, true);
 
   // Landmarks to landmarks, then surface to surface.
   std::vector<WarpLandmark> pairs;
@@ -296,7 +305,7 @@ FittedPoints fitPoints(const Mesh& mesh, const FeaturePointChoices& given, std::
   if (face.folded > 0)
     out.notes.push_back(std::to_string(face.folded) +
                         " triangles of the generic face folded on the way and were laid flat");
-  out.dense = denseCorrespondence(head, start, warp, face, target);
+  out.dense = denseCorrespondence(head, start, warp, face, target, on_mesh.inFrameOf(frame, false));
   return out;
 }
 

@@ -4,14 +4,13 @@
 
 #include <array>
 #include <cstddef>
-#include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "rig/build_rig.h"
 #include "rig/fitting/generic_head.h"
-#include "rig/fitting/human_face.h"
 
 namespace volto::rig {
 
@@ -23,8 +22,7 @@ struct RoughPoint {
 };
 
 struct FitOptions {
-  // What the given points are completed with; nothing: humanFace(). For measuring with heads left out.
-  const HumanFace* human_face = nullptr;
+  const GenericHead* head = nullptr;  // what is bent; nothing: genericHead()
 };
 
 // Where a vertex of the generic head comes to lie on the target: for transfer of anything defined on the generic head.
@@ -40,7 +38,7 @@ struct FittedPoints {
   std::array<double, kFeaturePointCount> confidence{};  // 0..1; given points: 1
   std::vector<std::size_t> to_check;                    // feature points that a person should look at, worst first
   std::vector<std::string> notes;                       // what a person should know, one sentence each
-  std::vector<CorrespondingPlace> dense;                // per vertex of genericHead().mesh
+  std::vector<CorrespondingPlace> dense;                // per vertex of the generic head's mesh
 };
 
 // Given points stay exactly where they are; at least kFewestPoints of given and rough ones together are needed.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "rig/feature_points.h"
+#include "rig/fitting/human_face.h"
 #include "rig/mesh.h"
 
 namespace volto::rig {
@@ -21,18 +22,18 @@ struct GenericHead {
   Mesh mesh;               // the asset, every vertex; head frame, unit: the eye separation, bent to human proportions
   std::vector<bool> skin;  // per vertex of mesh: on the component that carries the points
 
-  // The outside of the face: what is cut out of the skin along the lids and the inner lips, up to half an eye
-  // separation beyond the points. Its vertices are vertices of `mesh`.
+  // The outside of the face: what is cut out of the skin along the lids and the inner lips, up to a third of an eye
+  // separation beyond the control mask. Its vertices are vertices of `mesh`.
   Mesh face;
   std::vector<std::uint32_t> vertex_of_face;
   std::array<SurfacePlace, kFeaturePointCount> points;  // on `face`
+  HumanFace human;                                      // where the points are; nearly the places above
 };
 
 // Made once, on first use (some 0.1 s); no file is read. Only the points and the topology of the asset are relied on.
 const GenericHead& genericHead();
 
-// From any head with its 84 points as vertices or positions near its surface. Throws InputError when the points or
-// the lids' and lips' loops are not on one component.
-GenericHead makeGenericHead(Mesh mesh, const FeaturePointPositions& points);
+// The shipped head bent to other proportions: for measuring with people left out.
+GenericHead makeGenericHead(const HumanFace& human);
 
 }  // namespace volto::rig

@@ -22,18 +22,13 @@ struct Stage {
   double reach;       // distance of half belief
   double min_cosine;  // of the normals
 };
-constexpr std::array<Stage, 12> kStages = {{{0.60, 0.20, 0.50},
-                                            {0.50, 0.18, 0.50},
-                                            {0.40, 0.15, 0.50},
-                                            {0.32, 0.12, 0.55},
-                                            {0.26, 0.10, 0.55},
-                                            {0.22, 0.08, 0.60},
-                                            {0.18, 0.07, 0.60},
-                                            {0.15, 0.06, 0.60},
-                                            {0.13, 0.05, 0.60},
-                                            {0.12, 0.05, 0.60},
-                                            {0.11, 0.05, 0.60},
-                                            {0.10, 0.05, 0.60}}};
+constexpr std::array<Stage, 7> kStages = {{{0.50, 0.20, 0.50},
+                                           {0.36, 0.15, 0.50},
+                                           {0.26, 0.11, 0.55},
+                                           {0.20, 0.08, 0.60},
+                                           {0.15, 0.06, 0.60},
+                                           {0.12, 0.05, 0.60},
+                                           {0.10, 0.05, 0.60}}};
 // How much of the way along the surface to the nearest point is asked for: little, since in smooth skin it says
 // nothing.
 constexpr double kTangential = 0.15;
@@ -79,7 +74,6 @@ class Sticker {
       const std::size_t folded = distrustFolds();
       out.folded = std::max(out.folded, folded);
       if (folded == 0) break;
-      step(kStages[kStages.size() - 3]);
       step(kStages.back());
     }
     out.positions = start_ + displacement_;
