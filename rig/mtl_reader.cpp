@@ -1,6 +1,8 @@
 #include "rig/mtl_reader.h"
 
+#include <algorithm>
 #include <array>
+#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <optional>
@@ -69,18 +71,29 @@ void applyMaterialLibrary(std::string_view text, Mesh& mesh) {
 
 void readMaterialLibraries(const std::filesystem::path& folder, std::span<const std::string> names, Mesh& mesh) {
   Notes notes;
-  for (const std::string& name : names) {
+  const auto read = [&](const std::string& name, bool may_be_several) {
     const std::string shown = "material library '" + printable(name) + "' ";
     if (!isPlainFileName(name)) {
       notes.add(shown + "was not opened: only a file beside the mesh is; colours are by material name");
-      continue;
+      return true;
     }
     try {
       applyMaterialLibrary(readFileBytes(folder / name, kMaxLibraryBytes, LinksFollowed::no), mesh);
     } catch (const std::system_error& error) {
+      if (may_be_several && error.code().value() == ENOENT) return false;
       notes.add(shown + "was not read (" + error.code().message() + "); colours are by material name");
     } catch (const InputError&) {
       notes.add(shown + "was not read: no regular file of at most 4 MiB; colours are by material name");
+    }
+    return true;
+  };
+  for (const std::string& name : names) {
+    // A blank may be part of the name, as most programs write it, or stand between two names, as the format has it.
+    if (read(name, name.find(' ') != name.npos)) continue;
+    for (std::string_view rest = trimmed(name); !rest.empty();) {
+      const std::size_t end = std::min(rest.find(' '), rest.size());
+      read(std::string(rest.substr(0, end)), false);
+      rest = trimmed(rest.substr(end));
     }
   }
   for (std::string& note : notes.take()) mesh.notes.push_back(std::move(note));

@@ -32,12 +32,15 @@ TEST_F(Bake, BakingTwiceGivesIdenticalBytes) {
   const std::string input = performance(30);
   for (const std::string round : {"a", "b"}) {
     const Finished run = volto({"bake", input, "--rig", rig(), "--obj", path("obj_" + round), "--csv",
-                                path(round + ".csv"), "--png", path("png_" + round), "--every", "10"});
+                                path(round + ".csv"), "--png", path("png_" + round), "--glb", path(round + ".glb"),
+                                "--livelink", path(round + "_phone.csv"), "--every", "10"});
     ASSERT_EQ(run.status, 0) << run.err;
     EXPECT_EQ(run.out + run.err, "");
   }
+  EXPECT_EQ(readFile(path("a.glb")), readFile(path("b.glb")));
+  EXPECT_EQ(readFile(path("a_phone.csv")), readFile(path("b_phone.csv")));
   EXPECT_EQ(readFile(path("a.csv")), readFile(path("b.csv")));
-  expectSameFolders(path("obj_a"), path("obj_b"), 3);
+  expectSameFolders(path("obj_a"), path("obj_b"), 4);  // three frames and their materials
   expectSameFolders(path("png_a"), path("png_b"), 3);
 }
 
@@ -53,6 +56,55 @@ TEST_F(Bake, MeshKeepsTheArtistsVerticesAndFaces) {
   EXPECT_GT(count(artist, "v "), 1000U);
   EXPECT_EQ(count(baked, "v "), count(artist, "v "));
   EXPECT_EQ(count(baked, "f "), count(artist, "f "));
+}
+
+// What other programs open: the number of an accessor, a name or a node in the JSON of a GLB file.
+std::size_t countOf(const std::string& text, const std::string& wanted) {
+  std::size_t found = 0;
+  for (std::size_t at = text.find(wanted); at != std::string::npos; at = text.find(wanted, at + wanted.size())) ++found;
+  return found;
+}
+
+TEST_F(Bake, GlbHoldsTheShapesTheEyesAndThePerformance) {
+  const Finished run = volto({"export", rig(), "-o", path("head.glb"), "--take", performance(12)});
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_EQ(run.out + run.err, "");
+  const std::string bytes = readFile(path("head.glb"));
+  EXPECT_EQ(bytes.substr(0, 4), "glTF");
+  for (const char* name :
+       {"\"jawOpen\"", "\"tongueOut\"", "\"leftEye\"", "\"rightEye\"", "\"_VOLTO_VERTEX\"", "\"iris\"", "\"weights\""})
+    EXPECT_GT(countOf(bytes, name), 0U) << name;
+  EXPECT_EQ(volto({"bake", path("performance.csv"), "--rig", rig(), "--glb", path("same.glb")}).status, 0);
+  EXPECT_EQ(readFile(path("same.glb")), bytes) << "export --take and bake --glb make the same file";
+  const Finished inspected = volto({"inspect", path("head.glb")});
+  EXPECT_EQ(inspected.status, 0) << inspected.err;
+  EXPECT_NE(inspected.out.find("kind: mesh"), std::string::npos);
+}
+
+TEST_F(Bake, ExportedShapesAreOneFileEach) {
+  const Finished run = volto({"export", rig(), "-o", path("shapes/")});
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_EQ(std::distance(fs::directory_iterator(path("shapes")), {}), 54) << "neutral, 52 shapes, materials";
+  EXPECT_EQ(readFile(path("shapes/jawOpen.obj")).rfind("mtllib materials.mtl\n", 0), 0U);
+}
+
+TEST_F(Bake, ExportSaysWhatItCannotDo) {
+  expectRefused(volto({"export", rig(), "-o", output("head.fbx")}), 2, "export", ".glb");
+  expectRefused(volto({"export", rig(), "-o", output("shapes") + "/", "--take", performance(2)}), 2, "export",
+                "--take");
+  expectRefused(volto({"export", path("absent.rig"), "-o", output("head.glb")}), 66, "export", "absent.rig");
+  expectRefused(volto({"export", performance(2), "-o", output("head.glb")}), 65, "export", "performance.csv");
+}
+
+TEST_F(Bake, LiveLinkFileIsAPerformanceAgain) {
+  ASSERT_EQ(
+      volto({"bake", performance(30), "--rig", rig(), "--livelink", path("phone.csv"), "--csv", path("a.csv")}).status,
+      0);
+  const std::string text = readFile(path("phone.csv"));
+  EXPECT_EQ(text.rfind("Timecode,BlendShapeCount,EyeBlinkLeft,", 0), 0U);
+  const Finished inspected = volto({"inspect", path("phone.csv"), "--json"});
+  ASSERT_EQ(inspected.status, 0) << inspected.err;
+  EXPECT_NE(inspected.out.find("\"frames\": 30"), std::string::npos) << inspected.out;
 }
 
 TEST_F(Bake, ContactSheetIsOnePicture) {

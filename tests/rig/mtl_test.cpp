@@ -50,6 +50,9 @@ TEST(Mtl, OnlyARegularFileBesideTheMeshIsOpened) {
   const Mesh good = read("my colours.mtl");
   EXPECT_EQ(good.materials[0].colour[0], 0.5F);
   EXPECT_TRUE(good.notes.empty());
+  std::ofstream(folder / "model/second.mtl") << "newmtl left eye\nKd 1 0 0\n";
+  EXPECT_EQ(read("absent.mtl second.mtl").materials[1].colour[0], 1.0F) << "two names in one line";
+  EXPECT_EQ(read("absent.mtl second.mtl").notes.size(), 1U);
   for (const std::string& bad :
        {std::string("../outside.mtl"), (folder / "outside.mtl").string(), std::string("../../etc/passwd"),
         std::string("link.mtl"), std::string("trap.mtl"), std::string("absent.mtl"), std::string("."),

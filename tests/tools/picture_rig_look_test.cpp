@@ -1,6 +1,8 @@
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <string_view>
 
 #include <gtest/gtest.h>
 
@@ -63,6 +65,20 @@ TEST(RigLook, MaterialsOfTheFileAreKept) {
   const Look look = lookOfRig(head);
   EXPECT_TRUE(look.vertex_tint.empty());
   EXPECT_FLOAT_EQ(look.surfaces[0].albedo.z, 0.4F);
+}
+
+TEST(RigLook, ShippedCharactersHaveTheirOwnColours) {
+  for (const char* name : {"volto_head.obj", "volto_creature.obj"}) {
+    const rig::Mesh mesh = rig::readMesh(test::sourceDir() / "rig/assets" / name);
+    EXPECT_TRUE(mesh.notes.empty()) << name;
+    const Look look = lookOf(mesh);
+    EXPECT_TRUE(look.eyeballs.empty()) << name << ": iris and pupil are materials, nothing is painted over them";
+    const auto skin = std::find_if(look.surfaces.begin(), look.surfaces.end(),
+                                   [](const Surface& surface) { return surface.name == "skin"; });
+    ASSERT_NE(skin, look.surfaces.end()) << name;
+    const bool creature = std::string_view(name) == "volto_creature.obj";
+    EXPECT_EQ(skin->albedo.y > skin->albedo.x, creature) << name << ": one is green";
+  }
 }
 
 TEST(RigLook, FacePointsMakeACloserPicture) {

@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "rig/file_bytes.h"
 #include "rig/mesh_io.h"
 #include "rig/rig_file.h"
 #include "tools/cli/bake_picture.h"
@@ -17,6 +18,9 @@
 #include "tools/cli/stop_signal.h"
 #include "tools/cli/tracking_flags.h"
 #include "tools/cli/verb.h"
+#include "tools/export/glb_file.h"
+#include "tools/export/livelink_csv.h"
+#include "tools/export/movement.h"
 #include "tools/pipeline/weights_csv.h"
 
 namespace volto::cli {
@@ -28,6 +32,8 @@ struct Options {
   std::string rig;
   std::string obj;
   std::string csv;
+  std::string glb;
+  std::string livelink;
   std::string png;
   std::string view = "front";
   std::size_t every = 1;
@@ -52,6 +58,9 @@ class ObjSink : public Sink {
   ObjSink(std::filesystem::path folder, const rig::Mesh& mesh)
       : folder_(std::move(folder)), mesh_(mesh), positions_(mesh.positions) {
     makeOutputFolder(folder_);
+    if (mesh_.materials.empty()) return;
+    options_.material_library = "materials.mtl";
+    rig::writeMtl(folder_ / options_.material_library, mesh_);
   }
 
   void frame(std::size_t number, const AvatarFrame& avatar, std::int64_t) override {
@@ -61,13 +70,14 @@ class ObjSink : public Sink {
             static_cast<double>(avatar.vertices[v][axis]);
       }
     }
-    rig::writeObj(folder_ / frameFileName(number, ".obj"), mesh_, positions_);
+    rig::writeObj(folder_ / frameFileName(number, ".obj"), mesh_, positions_, options_);
   }
 
  private:
   std::filesystem::path folder_;
   const rig::Mesh& mesh_;
   rig::VertexPositions positions_;
+  rig::ObjOptions options_;
 };
 
 class CsvSink : public Sink {
@@ -90,6 +100,40 @@ class CsvSink : public Sink {
  private:
   OutputFile file_;
   std::string text_;
+};
+
+class LiveLinkSink : public Sink {
+ public:
+  LiveLinkSink(const std::string& path, const rig::Rig& rig) : rows_(rig), file_(path) {
+    file_.write(exporter::liveLinkHeader());
+  }
+
+  void frame(std::size_t, const AvatarFrame& avatar, std::int64_t t_ns) override {
+    text_.clear();
+    rows_.append(text_, t_ns, avatar);
+    file_.write(text_);
+  }
+
+  void finish() override { file_.commit(); }
+
+ private:
+  exporter::LiveLinkRows rows_;
+  OutputFile file_;
+  std::string text_;
+};
+
+class GlbSink : public Sink {
+ public:
+  GlbSink(const std::string& path, const rig::Rig& rig) : path_(path), rig_(rig), recorder_(rig) {
+    requireReplaceable(path);
+  }
+  void frame(std::size_t, const AvatarFrame& avatar, std::int64_t t_ns) override { recorder_.add(avatar, t_ns); }
+  void finish() override { rig::writeFileAtomically(path_, exporter::formatGlb(rig_, &recorder_.movement())); }
+
+ private:
+  std::string path_;
+  const rig::Rig& rig_;
+  exporter::MovementRecorder recorder_;
 };
 
 class PngSink : public Sink {
@@ -119,18 +163,20 @@ int run(const Options& options) {
   if (options.animate && (options.png.empty() || options.sheet)) {
     throw CommandError(kWrongUsage, "--animate makes one moving picture of --png F; it needs --png and no --sheet");
   }
-  if (options.obj.empty() && options.csv.empty() && options.png.empty()) {
-    throw CommandError(kWrongUsage, "say what to make: --obj DIR, --csv F or --png F; see volto help bake");
+  if (options.obj.empty() && options.csv.empty() && options.png.empty() && options.glb.empty() &&
+      options.livelink.empty()) {
+    throw CommandError(kWrongUsage,
+                       "say what to make: --obj DIR, --glb F, --csv F, --livelink F or --png F; see volto help bake");
   }
   requireReadable(options.rig);
-  for (const std::string& output : {options.csv, options.png}) {
+  for (const std::string& output : {options.csv, options.png, options.glb, options.livelink}) {
     if (output.empty()) continue;
     requireDifferent(options.take, output);
     requireDifferent(options.rig, output);
   }
   const rig::Rig rig = rig::readRig(options.rig);
   const pipeline::Performance performance = readPerformanceFor("bake", options.take);
-  const bool mesh = !options.obj.empty() || !options.png.empty();
+  const bool mesh = !options.obj.empty() || !options.png.empty() || !options.glb.empty();
   pipeline::FramePath path(rig, trackingOptions(options.tracking, performance), {.mesh = mesh, .weights = true});
 
   const std::vector<std::size_t> wanted = framesToWrite(performance, options);
@@ -138,6 +184,8 @@ int run(const Options& options) {
   std::vector<std::unique_ptr<Sink>> sinks;
   if (!options.obj.empty()) sinks.push_back(std::make_unique<ObjSink>(options.obj, rig.neutral));
   if (!options.csv.empty()) sinks.push_back(std::make_unique<CsvSink>(options.csv, rig));
+  if (!options.livelink.empty()) sinks.push_back(std::make_unique<LiveLinkSink>(options.livelink, rig));
+  if (!options.glb.empty()) sinks.push_back(std::make_unique<GlbSink>(options.glb, rig));
   if (!options.png.empty()) sinks.push_back(std::make_unique<PngSink>(options, rig, wanted.size()));
 
   Progress progress("baking frame", wanted.back() + 1);
@@ -167,6 +215,13 @@ RunVerb defineBake(CLI::App& app) {
   app.add_option("--obj", options->obj,
                  "a folder for one OBJ file per frame, frame_000000.obj and so on; head pose not applied")
       ->type_name("DIR");
+  app.add_option(
+         "--glb", options->glb,
+         "one GLB file: the character with its blendshapes as morph targets, and the performance as its animation")
+      ->type_name("F.glb");
+  app.add_option("--livelink", options->livelink,
+                 "weights in Live Link Face's CSV format, with the true times as timecode; - is standard output")
+      ->type_name("F.csv");
   app.add_option("--csv", options->csv,
                  "weights of the character's blendshapes and head angles, a row per frame; - is standard output")
       ->type_name("F");

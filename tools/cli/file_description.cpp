@@ -59,9 +59,9 @@ Json describeFile(const std::filesystem::path& path) {
   if (beginning.starts_with("SQLite format 3")) return describeTake(path);
   if (capture::csvKind(beginning) != capture::CsvKind::unknown || hasExtension(path, ".csv"))
     return describePerformance(path);
-  if (hasExtension(path, ".obj")) return describeMesh(path);
+  if (rig::isMeshFileName(path)) return describeMesh(path);
   if (hasExtension(path, ".rig") || beginning.find('\0') != std::string::npos) return describeRig(path);
-  throw CommandError(kBadData, path.string() + ": is no rig, take, OBJ mesh, OpenFace CSV or Live Link Face CSV file");
+  throw CommandError(kBadData, path.string() + ": is no rig, take, mesh (OBJ, PLY, OFF, STL, glTF, GLB), OpenFace CSV or Live Link Face CSV file");
 }
 
 Json describeMesh(const std::filesystem::path& path) {
@@ -81,19 +81,17 @@ Json describeMesh(const std::filesystem::path& path) {
   out["materials"] = std::move(materials);
   out["texture_coordinates"] = !mesh.corner_texcoords.empty();
 
-  std::vector<bool> used(mesh.vertexCount());
-  for (const std::uint32_t vertex : mesh.corner_vertices) used[vertex] = true;
-  std::size_t repeated = 0;
-  for (std::size_t polygon = 0; polygon < mesh.polygonCount(); ++polygon) {
-    std::vector<std::uint32_t> corners(mesh.corner_vertices.begin() + mesh.polygon_start[polygon],
-                                       mesh.corner_vertices.begin() + mesh.polygon_start[polygon + 1]);
-    std::sort(corners.begin(), corners.end());
-    repeated += std::adjacent_find(corners.begin(), corners.end()) != corners.end() ? 1 : 0;
-  }
-  const auto unused = static_cast<std::size_t>(std::count(used.begin(), used.end(), false));
+  out["vertex_colours"] = !mesh.vertex_colours.empty();
+
+  const rig::MeshHealth health = rig::inspectMesh(mesh);
   Json problems = Json::array();
-  if (unused > 0) problems.push_back(std::to_string(unused) + " vertices are in no polygon");
-  if (repeated > 0) problems.push_back(std::to_string(repeated) + " polygons name a vertex twice");
+  const auto count = [&](std::size_t number, const char* what) {
+    if (number > 0) problems.push_back(std::to_string(number) + what);
+  };
+  count(health.unused_vertices, " vertices are in no polygon");
+  count(health.degenerate_polygons, " polygons name a vertex twice");
+  count(health.duplicate_polygons, " polygons are there more than once");
+  for (const std::string& note : mesh.notes) problems.push_back(note);
   out["problems"] = std::move(problems);
   return out;
 }

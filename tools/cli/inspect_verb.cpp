@@ -31,7 +31,7 @@ int run(const Options& options) {
 
 RunVerb defineInspect(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("file", options->file, "a rig, a take, an OBJ mesh, an OpenFace CSV or a Live Link Face CSV file")
+  app.add_option("file", options->file, "a rig, a take, a mesh (OBJ, PLY, OFF, STL, glTF, GLB), an OpenFace CSV or a Live Link Face CSV file")
       ->required()
       ->type_name("FILE");
   app.add_flag("--json", options->json, "for programs");

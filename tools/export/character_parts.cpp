@@ -34,7 +34,7 @@ class Cutter {
     makeParts();
     for (std::size_t p = 0; p < mesh_.polygonCount(); ++p) addPolygon(p);
     std::erase_if(out_.parts, [](const ExportPart& part) { return part.groups.empty(); });
-    dropUnusedMaterials();
+    tidyMaterials();
   }
   CharacterParts take() { return std::move(out_); }
 
@@ -133,20 +133,33 @@ class Cutter {
     return entry->second;
   }
 
-  // Some surfaces of a look are there only in case.
-  void dropUnusedMaterials() {
-    std::vector<std::uint32_t> number(out_.materials.size(), 0);
-    std::vector<ExportMaterial> kept;
+  // Some surfaces of a look are there only in case, and some are the same: each part of a face may bring its own.
+  void tidyMaterials() {
     std::vector<bool> used(out_.materials.size(), false);
     for (const ExportPart& part : out_.parts)
       for (const ExportPart::Group& group : part.groups) used[group.material] = true;
+    std::vector<std::uint32_t> number(out_.materials.size(), 0);
+    std::vector<ExportMaterial> kept;
     for (std::size_t m = 0; m < used.size(); ++m) {
-      number[m] = static_cast<std::uint32_t>(kept.size());
-      if (used[m]) kept.push_back(out_.materials[m]);
+      if (!used[m]) continue;
+      const auto same = std::find(kept.begin(), kept.end(), out_.materials[m]);
+      number[m] = static_cast<std::uint32_t>(same - kept.begin());
+      if (same == kept.end()) kept.push_back(out_.materials[m]);
     }
-    for (ExportPart& part : out_.parts)
-      for (ExportPart::Group& group : part.groups) group.material = number[group.material];
     out_.materials = std::move(kept);
+    for (ExportPart& part : out_.parts) {
+      std::vector<ExportPart::Group> groups;
+      for (ExportPart::Group& group : part.groups) {
+        group.material = number[group.material];
+        const auto same = std::find_if(groups.begin(), groups.end(),
+                                       [&](const ExportPart::Group& g) { return g.material == group.material; });
+        if (same == groups.end())
+          groups.push_back(std::move(group));
+        else
+          same->corners.insert(same->corners.end(), group.corners.begin(), group.corners.end());
+      }
+      part.groups = std::move(groups);
+    }
   }
 
   const rig::Rig& rig_;

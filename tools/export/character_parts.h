@@ -17,6 +17,8 @@ struct ExportMaterial {
   float opacity = 1.0F;
   float roughness = 0.6F;
   bool double_sided = false;
+
+  friend bool operator==(const ExportMaterial&, const ExportMaterial&) = default;
 };
 
 struct ExportPart {
