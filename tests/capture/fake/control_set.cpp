@@ -64,6 +64,12 @@ void ControlSet::addDisconnectButton() {
 
 bool ControlSet::takeDisconnect() { return std::exchange(disconnect_, false); }
 
+std::vector<int> ControlSet::values() const {
+  std::vector<int> out;
+  for (const FakeControl& control : controls_) out.push_back(control.value);
+  return out;
+}
+
 const FakeControl* ControlSet::find(std::uint32_t id) const {
   for (const FakeControl& control : controls_) {
     if (control.id == id) return &control;

@@ -30,7 +30,9 @@ class ControlSet {
   // `array` is the caller's controls, `header.count` of them.
   int extCtrls(v4l2_ext_controls& header, v4l2_ext_control* array, Access access);
   const FakeControl* find(std::uint32_t id) const;
-  bool takeDisconnect();  // the button was pressed since the last time
+  const std::vector<FakeControl>& all() const { return controls_; }
+  std::vector<int> values() const;  // in that order
+  bool takeDisconnect();            // the button was pressed since the last time
 
  private:
   const FakeControl* findNext(std::uint32_t id) const;

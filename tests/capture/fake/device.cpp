@@ -263,7 +263,7 @@ int Device::streamParm(v4l2_streamparm& parm, bool set) {
   }
   parm.parm.capture.capability = V4L2_CAP_TIMEPERFRAME;
   parm.parm.capture.timeperframe = interval_;
-  parm.parm.capture.readbuffers = 4;
+  parm.parm.capture.readbuffers = 0;  // read() is not there
   return 0;
 }
 
@@ -407,13 +407,79 @@ void Device::streamOff() {
 
 std::uint32_t Device::readiness(const OpenFile& file) {
   if (!alive(file)) return POLLERR | POLLHUP | POLLPRI;
-  if (!streaming_ || faults.fatal) return POLLERR;
-  if (!done_.empty()) return POLLIN | POLLRDNORM;
+  const std::uint32_t events = file.events.empty() ? 0 : POLLPRI;
+  if (!streaming_ || faults.fatal) return events | POLLERR;
+  if (!done_.empty()) return events | POLLIN | POLLRDNORM;
   if (faults.spurious > 0) {
     if (faults.spurious != kForever) --faults.spurious;
-    return POLLIN | POLLRDNORM;
+    return events | POLLIN | POLLRDNORM;
   }
+  return events;
+}
+
+// v4l2-event.c and v4l2-ctrls-api.c: one waiting event for each control of each file; a newer one takes its place.
+void Device::queueEvent(OpenFile& file, std::uint32_t id, std::uint32_t changes, std::int64_t now_ns) const {
+  const FakeControl* const control = controls_.find(id);
+  v4l2_event event{};
+  event.type = V4L2_EVENT_CTRL;
+  event.id = id;
+  event.sequence = file.event_sequence++;
+  event.timestamp = {now_ns / 1'000'000'000, now_ns % 1'000'000'000};
+  event.u.ctrl.changes = changes;
+  event.u.ctrl.type = control->type;
+  event.u.ctrl.value = control->value;
+  if (control->type == V4L2_CTRL_TYPE_CTRL_CLASS)
+    event.u.ctrl.flags = V4L2_CTRL_FLAG_READ_ONLY | V4L2_CTRL_FLAG_WRITE_ONLY;
+  event.u.ctrl.minimum = control->minimum;
+  event.u.ctrl.maximum = control->maximum;
+  event.u.ctrl.step = control->step;
+  event.u.ctrl.default_value = control->default_value;
+  std::erase_if(file.events, [&](const v4l2_event& old) {
+    if (old.id == id) event.u.ctrl.changes |= old.u.ctrl.changes;
+    return old.id == id;
+  });
+  file.events.push_back(event);
+}
+
+int Device::subscribe(OpenFile& file, const v4l2_event_subscription& subscription, std::int64_t now_ns) {
+  const FakeControl* const control = controls_.find(subscription.id);
+  if (subscription.type != V4L2_EVENT_CTRL || control == nullptr) return -EINVAL;
+  for (const v4l2_event_subscription& each : file.subscriptions) {
+    if (each.id == subscription.id) return 0;
+  }
+  file.subscriptions.push_back(subscription);
+  // Headings have nothing to tell.
+  if ((subscription.flags & V4L2_EVENT_SUB_FL_SEND_INITIAL) != 0 && control->type != V4L2_CTRL_TYPE_CTRL_CLASS)
+    queueEvent(file, subscription.id, V4L2_EVENT_CTRL_CH_FLAGS | V4L2_EVENT_CTRL_CH_VALUE, now_ns);
   return 0;
+}
+
+int Device::unsubscribe(OpenFile& file, const v4l2_event_subscription& subscription) {
+  const bool all = subscription.type == V4L2_EVENT_ALL;
+  std::erase_if(file.subscriptions, [&](const auto& each) { return all || each.id == subscription.id; });
+  std::erase_if(file.events, [&](const v4l2_event& each) { return all || each.id == subscription.id; });
+  return 0;
+}
+
+int Device::dequeueEvent(OpenFile& file, v4l2_event& event) {
+  if (file.events.empty()) return -ENOENT;
+  event = file.events.front();
+  file.events.erase(file.events.begin());
+  event.pending = static_cast<std::uint32_t>(file.events.size());
+  return 0;
+}
+
+void Device::tellChanges(const OpenFile& setter, const std::vector<int>& values_before, std::int64_t now_ns) {
+  for (std::size_t i = 0; i < values_before.size(); ++i) {
+    const FakeControl& control = controls_.all()[i];
+    if (control.value == values_before[i]) continue;
+    for (OpenFile* const file : files) {
+      for (const v4l2_event_subscription& each : file->subscriptions) {
+        if (each.id == control.id && (file != &setter || (each.flags & V4L2_EVENT_SUB_FL_ALLOW_FEEDBACK) != 0))
+          queueEvent(*file, control.id, V4L2_EVENT_CTRL_CH_VALUE, now_ns);
+      }
+    }
+  }
 }
 
 int Device::memoryAt(const OpenFile& file, std::size_t length, std::int64_t offset, std::int64_t& out_offset) {
@@ -501,14 +567,18 @@ void Device::makePicture() {
   done_.push_back(index);
 }
 
-int Device::extControls(OpenFile& file, unsigned long request, v4l2_ext_controls& header, v4l2_ext_control* array) {
+int Device::extControls(OpenFile& file, unsigned long request, v4l2_ext_controls& header, v4l2_ext_control* array,
+                        std::int64_t now_ns) {
   if (!alive(file)) return -ENODEV;
   if (file.metadata) return -ENOTTY;
   if (request == VIDIOC_S_EXT_CTRLS && file.priority < highestPriority()) return -EBUSY;
-  return controls_.extCtrls(header, array,
-                            request == VIDIOC_G_EXT_CTRLS   ? ControlSet::Access::get
-                            : request == VIDIOC_S_EXT_CTRLS ? ControlSet::Access::set
-                                                            : ControlSet::Access::attempt);
+  const std::vector<int> before = controls_.values();
+  const int result = controls_.extCtrls(header, array,
+                                        request == VIDIOC_G_EXT_CTRLS   ? ControlSet::Access::get
+                                        : request == VIDIOC_S_EXT_CTRLS ? ControlSet::Access::set
+                                                                        : ControlSet::Access::attempt);
+  tellChanges(file, before, now_ns);
+  return result;
 }
 
 int Device::ioctl(OpenFile& file, unsigned long request, void* argument, std::int64_t now_ns) {
@@ -589,7 +659,9 @@ int Device::ioctl(OpenFile& file, unsigned long request, void* argument, std::in
     case VIDIOC_G_CTRL:
       return controls_.getCtrl(*static_cast<v4l2_control*>(argument));
     case VIDIOC_S_CTRL: {
+      const std::vector<int> before = controls_.values();
       const int result = controls_.setCtrl(*static_cast<v4l2_control*>(argument));
+      tellChanges(file, before, now_ns);
       if (controls_.takeDisconnect()) {
         const int number = spec.number;
         unplug();
@@ -608,6 +680,12 @@ int Device::ioctl(OpenFile& file, unsigned long request, void* argument, std::in
       if (faults.bad_offset) buffer.m.offset = 0x7FFF'F000;
       return 0;
     }
+    case VIDIOC_SUBSCRIBE_EVENT:
+      return subscribe(file, *static_cast<v4l2_event_subscription*>(argument), now_ns);
+    case VIDIOC_UNSUBSCRIBE_EVENT:
+      return unsubscribe(file, *static_cast<v4l2_event_subscription*>(argument));
+    case VIDIOC_DQEVENT:
+      return dequeueEvent(file, *static_cast<v4l2_event*>(argument));
     case VIDIOC_PREPARE_BUF:
       return others ? -EBUSY : queueBuffer(*static_cast<v4l2_buffer*>(argument), true);
     case VIDIOC_QBUF:

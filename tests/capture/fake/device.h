@@ -20,6 +20,9 @@ struct OpenFile {
   std::uint64_t generation = 0;  // of the device when it was opened; another one now: it was unplugged
   std::uint32_t priority = V4L2_PRIORITY_INTERACTIVE;
   bool metadata = false;
+  std::vector<v4l2_event_subscription> subscriptions;
+  std::vector<v4l2_event> events;  // oldest first
+  std::uint32_t event_sequence = 0;
 };
 
 class Device {
@@ -41,7 +44,8 @@ class Device {
 
   // `argument` is this function's own copy of what the caller gave. `array` of extended controls too.
   int ioctl(OpenFile& file, unsigned long request, void* argument, std::int64_t now_ns);
-  int extControls(OpenFile& file, unsigned long request, v4l2_ext_controls& header, v4l2_ext_control* array);
+  int extControls(OpenFile& file, unsigned long request, v4l2_ext_controls& header, v4l2_ext_control* array,
+                  std::int64_t now_ns);
   std::uint32_t readiness(const OpenFile& file);  // POLLIN, POLLERR, ...
 
   // The file behind a buffer's offset, to be mapped at `out_offset`; -errno.
@@ -72,6 +76,11 @@ class Device {
     timeval timestamp{};
   };
 
+  int subscribe(OpenFile& file, const v4l2_event_subscription& subscription, std::int64_t now_ns);
+  static int unsubscribe(OpenFile& file, const v4l2_event_subscription& subscription);
+  static int dequeueEvent(OpenFile& file, v4l2_event& event);
+  void queueEvent(OpenFile& file, std::uint32_t id, std::uint32_t changes, std::int64_t now_ns) const;
+  void tellChanges(const OpenFile& setter, const std::vector<int>& values_before, std::int64_t now_ns);
   int enumFormat(v4l2_fmtdesc& entry) const;
   int enumSizes(v4l2_frmsizeenum& entry) const;
   int enumIntervals(v4l2_frmivalenum& entry) const;

@@ -173,7 +173,7 @@ int World::extControls(File& file, unsigned long request, void* argument) {
   void* const users_array = header.controls;
   if (header.count > 0 && !copy(array.data(), users_array, array.size() * sizeof(array[0]))) return -EFAULT;
   std::memset(header.reserved, 0, sizeof(header.reserved));
-  const int result = file.device->extControls(*file.state, request, header, array.data());
+  const int result = file.device->extControls(*file.state, request, header, array.data(), now_ns_);
   if (header.count > 0 && !copy(users_array, array.data(), array.size() * sizeof(array[0]))) return -EFAULT;
   if (!copy(argument, &header, sizeof(header))) return -EFAULT;
   return result;

@@ -157,6 +157,7 @@ int main(int argc, char** argv) {
   say("  sizeimage covers the picture",
       format.fmt.pix.sizeimage >= format.fmt.pix.bytesperline * format.fmt.pix.height ? "yes" : "no");
 
+  const unsigned picture_bytes = format.fmt.pix.sizeimage;
   unsigned count = 0;
   say("REQBUFS 4", requestBuffers(g_fd, 4, count));
   say("  gives", std::to_string(count));
@@ -202,7 +203,7 @@ int main(int argc, char** argv) {
   char flags[16];
   std::snprintf(flags, sizeof(flags), "0x%x", buffer.flags);
   say("  flags", flags);
-  say("  bytesused is sizeimage", buffer.bytesused == format.fmt.pix.sizeimage ? "yes" : "no");
+  say("  bytesused is sizeimage", buffer.bytesused == picture_bytes ? "yes" : "no");
   // All buffers in our hands: the driver has none.
   unsigned held = 1;
   unsigned last_index = buffer.index;

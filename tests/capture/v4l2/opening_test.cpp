@@ -1,8 +1,14 @@
 // Which camera is meant, and what is said when it cannot be used.
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include <gtest/gtest.h>
 
 #include "capture/v4l2/discovery.h"
 #include "tests/capture/v4l2/camera_stage.h"
+#include "tests/support/test_data.h"
 
 namespace volto::capture {
 namespace {
@@ -91,6 +97,30 @@ TEST(CameraTrouble, BusyNamesTheHolder) {
   EXPECT_TRUE(says(openingError("streamon EBUSY"), {"in use"}));
 }
 
+TEST(CameraTrouble, TheHolderIsFoundThroughProc) {
+  const test::TemporaryDir folder;
+  const std::string path = (folder / "video0").string();
+  const pid_t child = fork();
+  if (child == 0) {
+    const int fd = open(path.c_str(), O_RDWR | O_CREAT, 0600);
+    dup2(fd, 0);
+    execlp("sleep", "sleep", "30", nullptr);
+    _exit(1);
+  }
+  const std::unique_ptr<v4l2::System> system = v4l2::makeRealSystem();
+  const std::string expected = "pid " + std::to_string(child) + " (sleep)";
+  std::string holder;
+  for (int i = 0; i < 500 && holder != expected; ++i) {
+    usleep(10'000);
+    holder = system->holderOf(path);
+  }
+  EXPECT_EQ(holder, expected);
+  EXPECT_NE(system->groupOf(path), "");
+  kill(child, SIGKILL);
+  waitpid(child, nullptr, 0);
+  EXPECT_EQ(system->holderOf(path), "");
+}
+
 TEST(CameraTrouble, NoFormatThatVoltoReadsNamesWhatThereIs) {
   EXPECT_TRUE(says(openingError("formats H264 640x480@30 / HEVC 640x480@30"), {"H264, HEVC", "MJPG"}));
   EXPECT_TRUE(says(openingError("enum only ZZZZ"), {"ZZZZ"}));
@@ -157,8 +187,6 @@ TEST(CameraControls, AreSetByTheNamesOfAnyKernel) {
   CameraOptions options;
   options.controls = {{"exposure_auto_priority", 0}, {"power_line_frequency", 2}, {"White Balance, Automatic", 0}};
   Stage stage("", options);
-  fake::OpenFile other;
-  other.generation = stage.camera().generation;
   const v4l2::Handle handle(stage.system, "/dev/video0");
   for (const v4l2::Control& control : v4l2::enumerateControls(handle)) {
     if (control.name == "exposure_dynamic_framerate") {

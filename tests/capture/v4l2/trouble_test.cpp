@@ -1,4 +1,7 @@
 // What befalls a camera while it streams, and how long it takes to go on. Times are those of the virtual clock.
+#include <filesystem>
+#include <fstream>
+
 #include <gtest/gtest.h>
 
 #include "tests/capture/v4l2/camera_stage.h"
@@ -112,10 +115,29 @@ TEST(Replug, WaitsForThePermissionThatTheSystemGivesAMomentLater) {
   EXPECT_LE(stage.untilState(SourceState::streaming), 0.2);
 }
 
-TEST(Replug, AThousandTimesLeavesFilesAndMappingsEqual) {
+// Of this process, as the kernel counts them.
+struct Resources {
+  std::size_t files, maps, threads;
+  bool operator==(const Resources&) const = default;
+};
+
+Resources resources() {
+  const auto entries = [](const char* folder) {
+    return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(folder), {}));
+  };
+  std::ifstream maps("/proc/self/maps");
+  std::size_t camera_maps = 0;
+  for (std::string line; std::getline(maps, line);)
+    camera_maps += line.find("fake camera") != std::string::npos ? 1 : 0;
+  return {entries("/proc/self/fd"), camera_maps, entries("/proc/self/task")};
+}
+
+TEST(Replug, AThousandTimesLeavesFilesMappingsAndThreadsEqual) {
   Stage stage("formats YUYV 64x48@30");
   ASSERT_EQ(stage.take(3), 3);
   const std::size_t files = stage.system.world().openFiles(), maps = stage.system.world().liveMaps();
+  const Resources before = resources();
+  EXPECT_EQ(before.maps, 4U) << "four buffers";
   for (int i = 0; i < 1000; ++i) {
     stage.system.world().apply("unplug");
     ASSERT_LE(stage.untilState(SourceState::no_signal), kPeriod + 0.050);
@@ -124,6 +146,7 @@ TEST(Replug, AThousandTimesLeavesFilesAndMappingsEqual) {
   }
   EXPECT_EQ(stage.system.world().openFiles(), files);
   EXPECT_EQ(stage.system.world().liveMaps(), maps);
+  EXPECT_EQ(resources(), before);
   EXPECT_EQ(stage.counters().losses, 1000U);
   EXPECT_EQ(stage.counters().reconnects, 1000U);
 }

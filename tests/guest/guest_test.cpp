@@ -1,0 +1,52 @@
+// A real kernel: QEMU boots one with its camera test driver, and Volto is tried on it. One boot; what happened is read
+// from its files.
+#include <cstdlib>
+#include <filesystem>
+#include <iostream>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/end_to_end/process.h"
+#include "tests/support/test_data.h"
+
+namespace volto::test {
+namespace {
+
+using nlohmann::json;
+
+TEST(Guest, VoltoStreamsFromARealDriverAndSurvivesADisconnect) {
+  const TemporaryDir out;
+  Process guest({(sourceDir() / "tests/guest/run").string(), voltoProgram(), VOLTO_V4L2_ANSWERS, out.path().string()});
+  const Finished finished = guest.wait(std::chrono::seconds(118));
+  if (finished.status == 77) GTEST_SKIP() << finished.out;
+  ASSERT_EQ(finished.status, 0) << finished.out << finished.err;
+
+  // What the fake camera was made after is still what the kernel does.
+  EXPECT_EQ(readFile(out / "answers.txt"), readFile(sourceDir() / "tests/capture/fake/kernel_answers.txt"));
+
+  const json cameras = json::parse(readFile(out / "cameras.json"))["cameras"];
+  ASSERT_EQ(cameras.size(), 1U);
+  EXPECT_EQ(cameras[0]["path"], "/dev/video0");
+  EXPECT_EQ(cameras[0]["driver"], "vivid");
+  EXPECT_EQ(cameras[0]["problem"], "");
+
+  EXPECT_EQ(readFile(out / "try.status"), "0\n") << readFile(out / "try.err");
+  const json trial = json::parse(readFile(out / "try.json"));
+  std::cout << "in the guest: " << trial["counters"].dump() << " " << trial["states"].dump() << "\n";
+  EXPECT_EQ(trial["width"], 320);
+  EXPECT_GE(trial["counters"]["captured"], 20) << trial.dump(2);
+  EXPECT_EQ(trial["counters"]["corrupt"], 0);
+  EXPECT_EQ(trial["counters"]["losses"], 1);
+  EXPECT_EQ(trial["counters"]["reconnects"], 1);
+  ASSERT_EQ(trial["states"].size(), 3U) << trial["states"].dump();
+  EXPECT_EQ(trial["states"][0]["state"], "streaming");
+  EXPECT_EQ(trial["states"][1]["state"], "no signal");
+  EXPECT_EQ(trial["states"][2]["state"], "streaming");
+  // A second, and one more for a processor that is simulated.
+  EXPECT_LE(trial["states"][2]["at_s"].get<double>() - trial["states"][1]["at_s"].get<double>(), 2.0);
+}
+
+}  // namespace
+}  // namespace volto::test
