@@ -6,6 +6,7 @@
 #include <cstring>
 #include <map>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include <Eigen/Geometry>
@@ -152,8 +153,7 @@ class GltfMeshReader {
           first_vertex.emplace(position->second, static_cast<std::uint32_t>(coordinates_.size() / 3));
       const std::size_t count = fresh ? addVertices(position->second, placed.scene_from_mesh)
                                       : model_.accessors[static_cast<std::size_t>(position->second)].count;
-      if (fresh || primitive.attributes.contains("TEXCOORD_0") || primitive.attributes.contains("COLOR_0"))
-        addAttributes(primitive, entry->second, count);
+      addAttributes(primitive, entry->second, count);
       addTriangles(primitive, mode, entry->second, count, mirrored);
     }
   }
@@ -189,9 +189,11 @@ class GltfMeshReader {
   }
 
   void addAttributes(const tinygltf::Primitive& primitive, std::uint32_t first, std::size_t count) {
+    // Nothing for what is not there, and for what another primitive of these vertices has brought already.
     const auto attribute = [&](const char* key) -> std::optional<int> {
       const auto found = primitive.attributes.find(key);
-      return found == primitive.attributes.end() ? std::nullopt : std::optional(found->second);
+      if (found == primitive.attributes.end() || !applied_.emplace(first, found->second).second) return {};
+      return found->second;
     };
     const auto sameCount = [&](const std::vector<double>& read, std::size_t components, const char* what) {
       if (read.size() != count * components)
@@ -330,6 +332,7 @@ class GltfMeshReader {
   std::vector<int> materials_;                   // of triangles, the file's numbers
   bool has_texcoords_ = false, has_colours_ = false;
   std::size_t skipped_ = 0, values_read_ = 0;
+  std::set<std::pair<std::uint32_t, int>> applied_;  // first vertex and accessor of attributes that were read
 };
 
 }  // namespace

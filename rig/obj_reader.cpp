@@ -186,10 +186,9 @@ class ObjParser {
     if (extras < 3 && colours_.empty()) return;
     if (colours_.empty()) colours_.resize(vertices - 1, {1.0F, 1.0F, 1.0F});
     const std::size_t first = extras - 3;
-    colours_.push_back(extras < 3
-                           ? std::array<float, 3>{1.0F, 1.0F, 1.0F}
-                           : std::array<float, 3>{linearFromDisplay(extra[first]), linearFromDisplay(extra[first + 1]),
-                                                  linearFromDisplay(extra[first + 2])});
+    colours_.push_back(extras < 3 ? std::array<float, 3>{1.0F, 1.0F, 1.0F}
+                                  : std::array<float, 3>{extra[first], extra[first + 1], extra[first + 2]});
+    for (const float part : colours_.back()) brightest_ = std::max(brightest_, part);
   }
 
   void texcoord() {
@@ -290,6 +289,10 @@ class ObjParser {
       if (l.index >= static_cast<std::int64_t>(count)) tooLarge(l.line, l.index + 1, what, count);
     }
     mesh_.positions = Eigen::Map<const VertexPositions>(coordinates_.data(), static_cast<Eigen::Index>(vertices), 3);
+    // 0..1 by most programs, 0..255 by some.
+    const float unit = brightest_ > 1.0F ? 255.0F : 1.0F;
+    for (auto& colour : colours_)
+      for (float& part : colour) part = linearFromDisplay(part / unit);
     mesh_.vertex_colours = std::move(colours_);
     if (!corner_texcoord_.empty()) {
       mesh_.corner_texcoords.reserve(corner_texcoord_.size());
@@ -311,7 +314,9 @@ class ObjParser {
   std::size_t line_ = 0;
   Mesh mesh_;
   std::vector<double> coordinates_;
-  std::vector<std::array<float, 3>> colours_;  // empty, or one per vertex; white where a vertex has none
+  float brightest_ = 0.0F;
+  std::vector<std::array<float, 3>>
+      colours_;  // as a screen shows them; empty, or one per vertex; white where a vertex has none
   std::vector<std::array<float, 2>> texcoords_;
   std::vector<std::string> material_libraries_;
   std::size_t normals_ = 0;

@@ -101,6 +101,16 @@ TEST(Obj, DecimalCommaAndMissingCoordinateAreRefused) {
   EXPECT_EQ(complaint("v 0 0 0 .5 .5 .5\nv 1 0 0 1\nv 0 1 0\nf 1 2 3\n"), "") << "weights and colours are allowed";
 }
 
+TEST(Obj, ColoursOfVerticesAreReadInEitherScale) {
+  for (const char* red : {"1 0 0.5", "255 0 127.5"}) {
+    const Mesh mesh = parseObj("v 0 0 0 " + std::string(red) + "\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "m");
+    ASSERT_EQ(mesh.vertex_colours.size(), 3U);
+    EXPECT_FLOAT_EQ(mesh.vertex_colours[0][0], 1.0F);
+    EXPECT_NEAR(mesh.vertex_colours[0][2], 0.214F, 1e-3) << "half on a screen is a fifth of the light";
+  }
+  EXPECT_TRUE(parseObj("v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 1 2 3\n", "m").vertex_colours.empty()) << "a weight";
+}
+
 TEST(Obj, LineEndsAndMarksOfOtherSystemsAreFine) {
   EXPECT_EQ(complaint("\xEF\xBB\xBFv 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\n\r\n# end\r\nf 1 2 \\\r\n 3"), "");
   EXPECT_NE(refused(std::string(kTriangle) + std::string("f 1 2 3\n\0\0", 10)), "");

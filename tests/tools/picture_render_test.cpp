@@ -317,6 +317,25 @@ TEST(Look, ColourOfTheFileWinsOverTheName) {
   EXPECT_EQ(look.polygon_surface, (std::vector<std::uint16_t>{0, 1}));
 }
 
+TEST(HeadRenderer, SeamOfTextureCoordinatesIsNotSeen) {
+  const rig::Mesh whole = ballWithNose();
+  // The same ball with every polygon's corners for themselves.
+  rig::Mesh cut = whole;
+  cut.positions.resize(static_cast<Eigen::Index>(whole.corner_vertices.size()), 3);
+  for (std::size_t c = 0; c < whole.corner_vertices.size(); ++c) {
+    cut.positions.row(static_cast<Eigen::Index>(c)) = whole.positions.row(whole.corner_vertices[c]);
+    cut.corner_vertices[c] = static_cast<std::uint32_t>(c);
+  }
+  Look look;
+  look.surfaces = {surfaceByName("skin")};
+  look.polygon_surface.assign(whole.polygonCount(), 0);
+  const Picture a = HeadRenderer(whole, look).render(frontView(96)).picture;
+  const Picture b = HeadRenderer(cut, look).render(frontView(96)).picture;
+  int worst = 0;
+  for (std::size_t i = 0; i < a.rgb.size(); ++i) worst = std::max(worst, std::abs(int{a.rgb[i]} - int{b.rgb[i]}));
+  EXPECT_LT(worst, 24) << "facets are not to be seen";
+}
+
 // A large sheet and a small ball before it; the ball's polygons come first.
 rig::Mesh ballBeforeASheet() {
   rig::Mesh mesh = ballWithNose();

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 
 #include "tools/picture/ambient_occlusion.h"
 #include "tools/picture/shading.h"
@@ -29,10 +31,11 @@ struct HeadRenderer::State {
   std::vector<std::array<std::uint32_t, 3>> triangles;  // of drawn surfaces
   std::vector<std::uint16_t> surface;                   // of each triangle
   std::vector<Vec3> neutral, focus;
+  std::vector<std::vector<std::uint32_t>> twins;
   float head_size = 1.0F;
 
   // Of the picture being drawn.
-  std::vector<Vec3> view_points, normals, face_normals;
+  std::vector<Vec3> view_points, normals, face_normals, twin_sums;
   std::vector<Camera::Point> screen, light_screen;
   VisibilityBuffer visible, shadow;
   OcclusionInput surfaces_seen;
@@ -41,6 +44,7 @@ struct HeadRenderer::State {
   State(const rig::Mesh& mesh, const Look& given);
   void project(const Camera& camera, std::span<const Vec3> points);
   void computeNormals();
+  void findTwins();
   void castShadow(Vec3 towards);
   float keyLight(Vec3 view_point, Vec3 normal) const;
   Rendered render(std::span<const Vec3> points, const ViewOptions& view);
@@ -78,6 +82,7 @@ HeadRenderer::State::State(const rig::Mesh& mesh, const Look& given) : look(give
   }
   head_size = std::max(length(high - low), 1e-20F);
   focus = neutral;
+  findTwins();
 }
 
 void HeadRenderer::State::project(const Camera& camera, std::span<const Vec3> points) {
@@ -103,7 +108,40 @@ void HeadRenderer::State::computeNormals() {
     normals[b] = normals[b] + normal;
     normals[c] = normals[c] + normal;
   }
+  // Vertices that a seam of texture coordinates has cut in two look smooth all the same; sides that face apart, like
+  // closed lips, stay apart.
+  twin_sums.clear();
+  for (const std::vector<std::uint32_t>& group : twins) {
+    for (const std::uint32_t v : group) {
+      Vec3 sum = normals[v];
+      for (const std::uint32_t other : group) {
+        if (other != v && dot(normals[v], normals[other]) > 0.0F) sum = sum + normals[other];
+      }
+      twin_sums.push_back(sum);
+    }
+  }
+  std::size_t next = 0;
+  for (const std::vector<std::uint32_t>& group : twins) {
+    for (const std::uint32_t v : group) normals[v] = twin_sums[next++];
+  }
   for (Vec3& normal : normals) normal = normalised(normal);
+}
+
+// Vertices at the same place at neutral, where there is more than one.
+void HeadRenderer::State::findTwins() {
+  constexpr std::size_t kMostTwins = 16;  // more is no seam
+  std::vector<std::uint32_t> order(neutral.size());
+  std::iota(order.begin(), order.end(), 0U);
+  const auto place = [&](std::uint32_t v) { return std::tuple(neutral[v].x, neutral[v].y, neutral[v].z); };
+  std::erase_if(order, [&](std::uint32_t v) { return !finite(neutral[v]); });
+  std::sort(order.begin(), order.end(),
+            [&](std::uint32_t a, std::uint32_t b) { return std::tuple(place(a), a) < std::tuple(place(b), b); });
+  for (std::size_t begin = 0, end = 0; begin < order.size(); begin = end) {
+    while (end < order.size() && place(order[end]) == place(order[begin])) ++end;
+    if (end - begin < 2 || end - begin > kMostTwins) continue;
+    twins.emplace_back(order.begin() + static_cast<std::ptrdiff_t>(begin),
+                       order.begin() + static_cast<std::ptrdiff_t>(end));
+  }
 }
 
 void HeadRenderer::State::castShadow(Vec3 towards) {
