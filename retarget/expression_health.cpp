@@ -15,8 +15,8 @@ namespace {
 
 using Triangle = std::array<std::uint32_t, 3>;
 
-// Nothing is deeper than this without its neighbours being less deep; a nearest point farther away is another part of the
-// skin.
+// Nothing is deeper than this without its neighbours being less deep; a nearest point farther away is another part of
+// the skin.
 constexpr double kDeepest = 0.03;
 
 Eigen::Vector3d at(std::span<const Vertex> positions, std::uint32_t v) {
@@ -34,6 +34,7 @@ struct Side {
   std::vector<Triangle> triangles;
   std::vector<std::uint32_t> probes;  // near the margin
   std::map<std::uint32_t, bool> border;
+  std::map<std::uint32_t, std::vector<std::uint32_t>> around;  // triangles of a vertex
 };
 
 // The two sides of a slit and how deep each is in the other at rest.
@@ -105,8 +106,11 @@ struct HealthMeasure::State {
       for (const auto& [edge, count] : edges) {
         if (count == 1) side->border[edge.first] = side->border[edge.second] = true;
       }
+      for (std::uint32_t t = 0; t < side->triangles.size(); ++t) {
+        for (const std::uint32_t v : side->triangles[t]) side->around[v].push_back(t);
+      }
       for (const std::uint32_t v : slit.vertex) {
-        if (sign * share[v] > 0.5F) side->probes.push_back(v);
+        if (sign * share[v] > 0.5F && side->around.contains(v)) side->probes.push_back(v);
       }
     }
     sides.upper_rest = depths(sides.upper, sides.lower, neutral);
@@ -135,9 +139,17 @@ struct HealthMeasure::State {
         at_border |= nearest.barycentric[k] > 1e-6 && other.border.contains(t[k]);
       }
       if (at_border) continue;
-      if (normalOf(pose, t).dot(p - q) < 0) out[i] = nearest.distance;
+      // Two surfaces that meet face each other; the inside of a lid near the other lid's inside does not count.
+      const Eigen::Vector3d normal = normalOf(pose, t);
+      if (normal.dot(p - q) < 0 && normal.dot(vertexNormal(side, side.probes[i], pose)) < 0) out[i] = nearest.distance;
     }
     return out;
+  }
+
+  static Eigen::Vector3d vertexNormal(const Side& side, std::uint32_t v, std::span<const Vertex> pose) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const std::uint32_t t : side.around.at(v)) sum += normalOf(pose, side.triangles[t]);
+    return sum;
   }
 
   double deepest(const Side& side, const Side& other, const std::vector<double>& rest, std::span<const Vertex> pose) {

@@ -120,10 +120,9 @@ class CorrectionMaker {
     if (name == "cheekPuff") puffCheeks(extra);
     if (name == "tongueOut") putTongueOut(extra);
     if (name.starts_with("mouthRoll") || name.starts_with("mouthPress")) keepBeforeTeeth(extra);
-    if (lids != nullptr) closeLids(*lids, extra);
-    lab_.unfold(extra);
     if (lids != nullptr) {
-      closeLids(*lids, extra);
+      closeWithoutFolds(*lids, extra);
+    } else {
       lab_.unfold(extra);
     }
     rig_.blendshapes[k].correction = lab_.sparse(extra);
@@ -146,7 +145,7 @@ class CorrectionMaker {
     if (first.starts_with("eyeBlink"))
       if (const SlitContact* lids =
               slitAt(first.ends_with("Left") ? SlitContact::Place::left_eye : SlitContact::Place::right_eye))
-        closeLids(*lids, extra);
+        closeWithoutFolds(*lids, extra);
     lab_.unfold(extra);
     Combination combination;
     combination.name = first + " + " + second;
@@ -195,10 +194,25 @@ class CorrectionMaker {
           const Vec tangent = up - up.dot(arm) / std::max(arm.squaredNorm(), 1e-12F) * arm;
           way = tangent / std::max(up.dot(tangent), 0.5F);
         }
-        extra[v] += by * way;
+        lab_.setPosition(v, lab_.at(v) + by * way, extra);
       }
     }
     lab_.evaluate(extra);
+  }
+
+  void closeWithoutFolds(const SlitContact& slit, DenseDisplacement& extra) {
+    std::vector<std::uint32_t> margins;
+    for (const auto* side : {&slit.upper, &slit.lower})
+      for (const SlitContact::Sample& s : *side) {
+        margins.push_back(s.first);
+        margins.push_back(s.second);
+      }
+    for (int round = 0; round < 3; ++round) {
+      closeLids(slit, extra);
+      if (!lab_.unfold(extra, margins)) continue;
+      const std::vector<float> gap = gaps(slit);
+      if (*std::max_element(gap.begin(), gap.end()) < 0.004F * es_) break;
+    }
   }
 
   // --- cheeks

@@ -8,7 +8,9 @@
 namespace volto::rig {
 namespace {
 
-constexpr int kMostRounds = 60;
+constexpr int kMostRounds = 72;
+constexpr int kHeldRounds = 48;  // then what should be held gives way too
+constexpr float kLeaning = 0.4F;
 constexpr float kFoldCosine = 0.12F;  // a little before a triangle stands at right angles to where it was
 constexpr float kLeastArea = 0.01F;   // of what it was
 
@@ -34,13 +36,37 @@ PoseLab::PoseLab(const Rig& rig, const Skin& skin)
   for (std::size_t p = 0; p < mesh.polygonCount(); ++p) {
     const std::uint32_t first = mesh.polygon_start[p], corners = mesh.polygon_start[p + 1] - first;
     const auto corner = [&](std::uint32_t c) { return mesh.corner_vertices[first + c % corners]; };
-    if (!free_[corner(0)]) continue;
+    bool any_free = false;
+    for (std::uint32_t c = 0; c < corners; ++c) any_free = any_free || free_[corner(c)];
+    if (!any_free) continue;
     if (corners == 4) {
       for (std::uint32_t c = 0; c < 4; ++c) add(corner(c), corner(c + 1), corner(c + 2));
     } else {
       for (std::uint32_t c = 2; c < corners; ++c) add(corner(0), corner(c - 1), corner(c));
     }
   }
+  triangles_of_start_.assign(neutral_.size() + 1, 0);
+  for (const auto& t : triangles_)
+    for (const std::uint32_t v : t) ++triangles_of_start_[skin_.same_as[v] + 1];
+  for (std::size_t v = 0; v < neutral_.size(); ++v) triangles_of_start_[v + 1] += triangles_of_start_[v];
+  triangles_of_.resize(triangles_of_start_.back());
+  std::vector<std::uint32_t> filled(triangles_of_start_.begin(), triangles_of_start_.end() - 1);
+  for (std::uint32_t t = 0; t < triangles_.size(); ++t)
+    for (const std::uint32_t v : triangles_[t]) triangles_of_[filled[skin_.same_as[v]]++] = t;
+  for (std::uint32_t v = 0; v < neutral_.size(); ++v)
+    if (skin_.same_as[v] != v && free_[v]) doubles_.push_back(v);
+  for (const BallContact& ball : rig.contacts.balls)
+    in_contact_.insert(in_contact_.end(), ball.vertex.begin(), ball.vertex.end());
+  for (const SlitContact& slit : rig.contacts.slits)
+    in_contact_.insert(in_contact_.end(), slit.vertex.begin(), slit.vertex.end());
+  slit_of_sample_.assign(neutral_.size(), -1);
+  for (std::size_t k = 0; k < rig.contacts.slits.size(); ++k)
+    for (const auto* side : {&rig.contacts.slits[k].upper, &rig.contacts.slits[k].lower})
+      for (const SlitContact::Sample& sample : *side)
+        for (const std::uint32_t v : {sample.first, sample.second})
+          slit_of_sample_[skin_.same_as[v]] = static_cast<std::int32_t>(k);
+  std::sort(in_contact_.begin(), in_contact_.end());
+  in_contact_.erase(std::unique(in_contact_.begin(), in_contact_.end()), in_contact_.end());
 }
 
 void PoseLab::setWeights(std::span<const float> weights) {
@@ -49,77 +75,108 @@ void PoseLab::setWeights(std::span<const float> weights) {
 }
 
 const std::vector<Position>& PoseLab::evaluate(const DenseDisplacement& extra) {
-  for (std::size_t v = 0; v < positions_.size(); ++v)
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      positions_[v][axis] = base_[v][axis] + extra[v][static_cast<Eigen::Index>(axis)];
+  for (std::uint32_t v = 0; v < positions_.size(); ++v) place(v, extra);
   resolveContacts(rig_.contacts, neutral_, positions_);
   return positions_;
 }
 
-std::vector<std::uint32_t> PoseLab::foldedVertices() const {
-  std::vector<std::uint32_t> out;
-  for (std::size_t t = 0; t < triangles_.size(); ++t) {
-    const auto& [a, b, c] = triangles_[t];
-    if (positions_[a] == neutral_[a] && positions_[b] == neutral_[b] && positions_[c] == neutral_[c]) continue;
-    const Eigen::Vector3f now = (at(b) - at(a)).cross(at(c) - at(a));
-    const float rest = rest_normal_[t].norm(), area = now.norm();
-    if (now.dot(rest_normal_[t]) > kFoldCosine * area * rest && area > kLeastArea * rest) continue;
-    for (const std::uint32_t v : triangles_[t]) out.push_back(skin_.same_as[v]);
-  }
-  std::sort(out.begin(), out.end());
-  out.erase(std::unique(out.begin(), out.end()), out.end());
-  return out;
+void PoseLab::place(std::uint32_t v, const DenseDisplacement& extra) {
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    positions_[v][axis] = base_[v][axis] + extra[v][static_cast<Eigen::Index>(axis)];
 }
 
-bool PoseLab::unfold(DenseDisplacement& extra) {
-  std::vector<std::uint32_t> region;
-  std::vector<std::uint8_t> in_region(neutral_.size(), 0);
-  std::vector<std::uint32_t> sharing;  // vertices that a standing one stands for
-  DenseDisplacement relaxed(neutral_.size());
+void PoseLab::setPosition(std::uint32_t v, const Eigen::Vector3f& to, DenseDisplacement& extra) {
+  extra[v] = to - Eigen::Map<const Eigen::Vector3f>(base_[v].data());
+  place(v, extra);
+}
+
+float PoseLab::uprightness(std::size_t triangle) const {
+  const auto& [a, b, c] = triangles_[triangle];
+  if (positions_[a] == neutral_[a] && positions_[b] == neutral_[b] && positions_[c] == neutral_[c]) return 1;
+  const Eigen::Vector3f now = (at(b) - at(a)).cross(at(c) - at(a));
+  const float rest = rest_normal_[triangle].norm(), area = now.norm();
+  return area > kLeastArea * rest ? now.dot(rest_normal_[triangle]) / (area * rest) : -1.0F;
+}
+
+bool PoseLab::unfold(DenseDisplacement& extra, std::span<const std::uint32_t> held) {
+  evaluate(extra);
+  // What is looked at again in every round: triangles that lean already, and all around the skin that is being relaxed.
+  std::vector<std::uint32_t> suspects;
+  std::vector<std::uint8_t> suspected(triangles_.size(), 0);
+  const auto suspect = [&](std::uint32_t t) {
+    if (suspected[t] == 0) suspects.push_back(t);
+    suspected[t] = 1;
+  };
+  for (std::uint32_t t = 0; t < triangles_.size(); ++t)
+    if (uprightness(t) < kLeaning) suspect(t);
+  if (suspects.empty()) return true;
+
+  std::vector<std::uint32_t> region, copies, seeds;
+  std::vector<std::uint8_t> in_region(neutral_.size(), 0), is_held(neutral_.size(), 0);
+  for (const std::uint32_t v : held) is_held[skin_.same_as[v]] = 1;
+  // Where a margin is relaxed, the push of its contact would be gone for all that it pushed: it becomes part of the
+  // correction instead.
+  std::vector<std::uint8_t> kept(rig_.contacts.slits.size(), 0), to_keep(kept);
+  const auto addToRegion = [&](std::uint32_t v) {
+    if (in_region[v] != 0 || !free_[v]) return;
+    in_region[v] = 1;
+    region.push_back(v);
+    if (slit_of_sample_[v] >= 0) to_keep[static_cast<std::size_t>(slit_of_sample_[v])] = 1;
+    for (std::uint32_t i = triangles_of_start_[v]; i < triangles_of_start_[v + 1]; ++i) suspect(triangles_of_[i]);
+  };
+  std::vector<Eigen::Vector3f> moved(neutral_.size(), Eigen::Vector3f::Zero()), next;
   for (int round = 0; round < kMostRounds; ++round) {
-    evaluate(extra);
-    std::vector<std::uint32_t> seeds = foldedVertices();
-    if (seeds.empty()) break;
-    if (round + 1 == kMostRounds) return false;
+    seeds.clear();
+    for (const std::uint32_t t : suspects)
+      if (uprightness(t) < kFoldCosine)
+        for (const std::uint32_t v : triangles_[t]) seeds.push_back(skin_.same_as[v]);
+    if (seeds.empty()) return true;
     // The region only grows, so that a fold is not chased to and fro; wider when a narrow one does not do.
-    const int rings = round % 8 == 0 ? 2 : 1;
-    for (int ring = 0; ring < rings; ++ring) {
-      const std::vector<std::uint32_t> front = seeds;
-      for (const std::uint32_t v : front)
-        for (std::uint32_t e = skin_.graph.start[v]; e < skin_.graph.start[v + 1]; ++e)
-          seeds.push_back(skin_.graph.neighbour[e]);
-      std::sort(seeds.begin(), seeds.end());
-      seeds.erase(std::unique(seeds.begin(), seeds.end()), seeds.end());
+    for (const std::uint32_t v : seeds) {
+      addToRegion(v);
+      if (round % 6 != 0) continue;
+      for (std::uint32_t e = skin_.graph.start[v]; e < skin_.graph.start[v + 1]; ++e)
+        addToRegion(skin_.graph.neighbour[e]);
     }
-    for (const std::uint32_t v : seeds)
-      if (in_region[v] == 0 && free_[v]) {
-        in_region[v] = 1;
-        region.push_back(v);
-      }
     std::sort(region.begin(), region.end());
-    // Two Jacobi steps: every displacement half way to the mean of its neighbours'.
-    std::vector<Eigen::Vector3f> change(region.size(), Eigen::Vector3f::Zero());
-    for (std::uint32_t v = 0; v < neutral_.size(); ++v) relaxed[v] = at(v) - rest(v);
-    for (int step = 0; step < 2; ++step) {
-      std::vector<Eigen::Vector3f> next(region.size());
+    for (std::size_t k = 0; k < kept.size(); ++k) {
+      if (kept[k] != 0 || to_keep[k] == 0) continue;
+      kept[k] = 1;
+      for (const std::uint32_t v : rig_.contacts.slits[k].vertex) setPosition(v, at(v), extra);
+    }
+    // Jacobi steps: every displacement half way to the mean of its neighbours'.
+    for (const std::uint32_t v : region) {
+      moved[v] = at(v) - rest(v);
+      for (std::uint32_t e = skin_.graph.start[v]; e < skin_.graph.start[v + 1]; ++e)
+        moved[skin_.graph.neighbour[e]] = at(skin_.graph.neighbour[e]) - rest(skin_.graph.neighbour[e]);
+    }
+    next.resize(region.size());
+    for (int step = 0; step < 3; ++step) {
       for (std::size_t i = 0; i < region.size(); ++i) {
         const std::uint32_t v = region[i];
-        Eigen::Vector3f mean = Eigen::Vector3f::Zero();
+        next[i] = moved[v];
         const auto count = static_cast<float>(skin_.graph.start[v + 1] - skin_.graph.start[v]);
+        if (count == 0 || (is_held[v] != 0 && round < kHeldRounds)) continue;
+        Eigen::Vector3f sum = Eigen::Vector3f::Zero();
         for (std::uint32_t e = skin_.graph.start[v]; e < skin_.graph.start[v + 1]; ++e)
-          mean += relaxed[skin_.graph.neighbour[e]];
-        next[i] = count > 0 ? Eigen::Vector3f(0.5F * relaxed[v] + 0.5F / count * mean) : relaxed[v];
+          sum += moved[skin_.graph.neighbour[e]];
+        next[i] = 0.5F * moved[v] + 0.5F / count * sum;
       }
-      for (std::size_t i = 0; i < region.size(); ++i) {
-        change[i] += next[i] - relaxed[region[i]];
-        relaxed[region[i]] = next[i];
-      }
+      for (std::size_t i = 0; i < region.size(); ++i) moved[region[i]] = next[i];
     }
-    for (std::size_t i = 0; i < region.size(); ++i) extra[region[i]] += change[i];
-    for (std::uint32_t v = 0; v < neutral_.size(); ++v)
-      if (skin_.same_as[v] != v && in_region[skin_.same_as[v]] != 0) extra[v] = extra[skin_.same_as[v]];
+    for (std::size_t i = 0; i < region.size(); ++i) {
+      // Not added to what `extra` was: contact may have undone part of that, and would again.
+      setPosition(region[i], moved[region[i]] + rest(region[i]), extra);
+    }
+    for (const std::uint32_t v : doubles_)
+      if (in_region[skin_.same_as[v]] != 0) {
+        extra[v] = extra[skin_.same_as[v]];
+        place(v, extra);
+      }
+    for (const std::uint32_t v : in_contact_) place(v, extra);
+    resolveContacts(rig_.contacts, neutral_, positions_);
   }
-  return true;
+  return false;
 }
 
 SparseDisplacement PoseLab::sparse(const DenseDisplacement& dense) const {

@@ -29,13 +29,13 @@ class PoseLab {
   const std::vector<Position>& beforeContacts() const { return base_; }
   const std::vector<Position>& neutral() const { return neutral_; }
 
-  // Vertices (standing ones) of triangles, both ways to cut a quad, that turned by nearly a right angle or lost nearly
-  // all of their area.
-  std::vector<std::uint32_t> foldedVertices() const;
+  // Relaxes the displacement around triangles (both ways to cut a quad) that turned by nearly a right angle or lost
+  // nearly all of their area, until there are none, or for a while: what it takes is added to `extra`. `held`: vertices
+  // that give way last. Returns whether no such triangle is left.
+  bool unfold(DenseDisplacement& extra, std::span<const std::uint32_t> held = {});
 
-  // Relaxes the displacement around folds until there are none, or for a while: what it takes is added to `extra`.
-  // Returns whether no fold is left.
-  bool unfold(DenseDisplacement& extra);
+  // The vertex is to be at `to`, contacts permitting: `extra` follows.
+  void setPosition(std::uint32_t v, const Eigen::Vector3f& to, DenseDisplacement& extra);
 
   DenseDisplacement nothing() const { return DenseDisplacement(neutral_.size(), Eigen::Vector3f::Zero()); }
   // Without what could not be seen.
@@ -45,13 +45,20 @@ class PoseLab {
   Eigen::Vector3f rest(std::uint32_t v) const { return Eigen::Map<const Eigen::Vector3f>(neutral_[v].data()); }
 
  private:
+  void place(std::uint32_t v, const DenseDisplacement& extra);
+  float uprightness(std::size_t triangle) const;  // cosine of the angle it turned by; -1 without area
+
   const Rig& rig_;
   const Skin& skin_;
   float es_;
   std::vector<Position> neutral_, base_, positions_;
   std::vector<std::array<std::uint32_t, 3>> triangles_;
   std::vector<Eigen::Vector3f> rest_normal_;
-  std::vector<bool> free_;  // skin that may be corrected
+  std::vector<std::uint32_t> triangles_of_start_, triangles_of_;  // of each standing vertex
+  std::vector<std::uint32_t> doubles_;                            // vertices that another one stands for
+  std::vector<std::uint32_t> in_contact_;     // vertices that resolveContacts may move, riders aside
+  std::vector<std::int32_t> slit_of_sample_;  // #V: the slit whose margin it is on, -1
+  std::vector<bool> free_;                    // skin that may be corrected
 };
 
 }  // namespace volto::rig
