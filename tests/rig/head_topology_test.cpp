@@ -1,5 +1,6 @@
 // The head as a surface: closed where it should be, oriented, symmetric, without degenerate faces.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <set>
@@ -122,6 +123,64 @@ TEST_P(HeadTopology, NoTriangleGoesThroughAnother) {
                   << place.y << ' ' << place.z;
   }
   EXPECT_EQ(crossing.size(), 0U);
+}
+
+// One point of the texture belongs to one place of the head: what the triangles cover together is as large as the sum
+// of their areas, counted on a raster; none is turned over.
+TEST_P(HeadTopology, TextureCoordinatesDoNotOverlapAndFillMostOfTheAtlas) {
+  constexpr int kSize = 1024;
+  std::vector<unsigned char> hits(static_cast<std::size_t>(kSize) * kSize, 0);
+  double area = 0;
+  long overlapping = 0, covered = 0;
+  for (const Polygon& polygon : head().polygons) {
+    ASSERT_EQ(polygon.uv.size(), polygon.corners.size());
+    for (std::size_t i = 1; i + 1 < polygon.uv.size(); ++i) {
+      const std::array<double, 2>&a = polygon.uv[0], &b = polygon.uv[i], &c = polygon.uv[i + 1];
+      for (const auto& uv : {a, b, c})
+        for (const double x : uv) ASSERT_TRUE(x >= 0 && x <= 1) << x;
+      const auto side = [](const std::array<double, 2>& p, const std::array<double, 2>& q, double x, double y) {
+        return (q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0]);
+      };
+      const double twice = side(a, b, c[0], c[1]);
+      ASSERT_GT(twice, 0) << "turned over or without an area";
+      area += twice / 2;
+      const auto pixel = [](double x) { return static_cast<int>(std::floor(x * kSize)); };
+      for (int y = pixel(std::min({a[1], b[1], c[1]})); y <= pixel(std::max({a[1], b[1], c[1]})); ++y)
+        for (int x = pixel(std::min({a[0], b[0], c[0]})); x <= pixel(std::max({a[0], b[0], c[0]})); ++x) {
+          const double u = (x + 0.5) / kSize, v = (y + 0.5) / kSize;
+          if (!(side(a, b, u, v) > 0 && side(b, c, u, v) > 0 && side(c, a, u, v) > 0)) continue;
+          unsigned char& hit = hits[static_cast<std::size_t>(y) * kSize + static_cast<std::size_t>(x)];
+          overlapping += hit;
+          covered += 1 - hit;
+          hit = 1;
+        }
+    }
+  }
+  EXPECT_EQ(overlapping, 0);
+  EXPECT_GT(area, 0.65);
+  EXPECT_NEAR(static_cast<double>(covered) / kSize / kSize, area, 0.002);
+}
+
+TEST_P(HeadTopology, TextureAndColoursMirrorToo) {
+  std::map<std::vector<int>, std::size_t> by_corners;
+  for (std::size_t p = 0; p < head().polygons.size(); ++p) by_corners[head().polygons[p].corners] = p;
+  for (const Polygon& polygon : head().polygons) {
+    std::vector<int> corners{head().mirror[static_cast<std::size_t>(polygon.corners[0])]};
+    for (std::size_t i = polygon.corners.size(); i-- > 1;)
+      corners.push_back(head().mirror[static_cast<std::size_t>(polygon.corners[i])]);
+    ASSERT_TRUE(by_corners.contains(corners)) << "mirrored polygons begin with the same corner";
+    const Polygon& other = head().polygons[by_corners[corners]];
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      const auto& uv = polygon.uv[i == 0 ? 0 : corners.size() - i];
+      ASSERT_NEAR(other.uv[i][0], 1 - uv[0], 1e-12);
+      ASSERT_EQ(other.uv[i][1], uv[1]);
+    }
+  }
+  for (std::size_t v = 0; v < head().vertices.size(); ++v) {
+    const Vec3 &a = head().tints[v], &b = head().tints[static_cast<std::size_t>(head().mirror[v])];
+    ASSERT_EQ(length(a - b), 0);
+    for (const double x : {a.x, a.y, a.z}) ASSERT_TRUE(x > 0 && x <= 1) << x;
+  }
 }
 
 TEST(CrossingTriangles, AreFoundWhereTheyAreAndNowhereElse) {

@@ -190,7 +190,7 @@ void evenOut(HalfMesh& mesh, const std::vector<double>& free, int rounds) {
 
 }  // namespace
 
-Character adult() { return {"volto_head", "Volto's head", {}, paletteOf(kAdultColours)}; }
+Character adult() { return {"volto_head", "Volto's head", {}, paletteOf(kAdultColours), {}}; }
 
 Character creature() {
   Proportions k;
@@ -217,7 +217,11 @@ Character creature() {
   k.ear_flare = 0.75;
   k.hair_thickness = 0;
   k.smoothness = 60;
-  return {"volto_creature", "Volto's creature", k, paletteOf(kCreatureColours)};
+  Tints tints;
+  tints.blush = {0.95, 0.72, 0.62};
+  tints.shade = {0.45, 0.60, 0.62};
+  tints.crown = {0.50, 0.62, 0.74};
+  return {"volto_creature", "Volto's creature", k, paletteOf(kCreatureColours), tints};
 }
 
 Vec3 eyeCentre(const Proportions& proportions) { return kEyeCentre + proportions.eye_shift; }

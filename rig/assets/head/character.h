@@ -8,6 +8,7 @@
 #include <string>
 
 #include "rig/assets/head/half_mesh.h"
+#include "rig/assets/head/tint.h"
 
 namespace volto::head {
 
@@ -42,6 +43,7 @@ struct Character {
   std::string name;  // for the files' first lines
   Proportions proportions;
   Palette palette;
+  Tints tints;
 };
 
 Character adult();     // volto_head: human proportions

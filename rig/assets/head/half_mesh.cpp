@@ -37,7 +37,7 @@ constexpr std::array<Row, kRows + 1> kRowTable{{
     {-4.08, -5.6, -5.8, 0},                               // nostril
     {-4.58, -5.8, -6.5, 0},                               // base of the nose
     {-5.2, -6.2, -7.2, 0},                                // top of the mouth block
-    {-6.3, -6.7, -8.2, 0},                                // corners of the mouth
+    {-6.15, -6.6, -8.2, 0},                               // corners of the mouth
     {-8.5, -7.7, -9.2, 0},                                // bottom of the mouth block
     {-9.9, -8.7, -10.2, 0},                               // chin
     {-11.0, -9.8, -11.2, 0},                              // bottom of the chin
@@ -124,7 +124,7 @@ class CageBuilder {
     return add(v);
   }
   void addPolygon(std::vector<int> corners, Material material) {
-    mesh_.polygons.push_back({std::move(corners), material});
+    mesh_.polygons.push_back({std::move(corners), material, {}});
   }
   int& grid(int row, int column) { return grid_[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)]; }
   const Vec3& at(int v) const { return mesh_.vertices[static_cast<std::size_t>(v)].position; }
@@ -390,7 +390,8 @@ HalfMesh split(const HalfMesh& coarse) {
     for (std::size_t i = 0; i < n; ++i) {
       const int before = polygon.corners[(i + n - 1) % n], here = polygon.corners[i],
                 after = polygon.corners[(i + 1) % n];
-      fine.polygons.push_back({{here, edgeMiddle(here, after), centre, edgeMiddle(before, here)}, polygon.material});
+      fine.polygons.push_back(
+          {{here, edgeMiddle(here, after), centre, edgeMiddle(before, here)}, polygon.material, {}});
     }
   }
   return fine;
@@ -506,6 +507,45 @@ void relax(HalfMesh& mesh, int rounds, double strength) {
       if (v.border) next[i].y = height;
     }
     for (std::size_t i = 0; i < n; ++i) mesh.vertices[i].position = next[i];
+  }
+}
+
+void polish(HalfMesh& mesh, int rounds) {
+  const std::size_t n = mesh.vertices.size();
+  std::vector<double> free;
+  for (const HalfVertex& v : mesh.vertices) {
+    double f = v.hold == Hold::skin && !v.border ? 1 : 0;
+    if (v.strip == Strip::nostril) f *= clamp01(0.6 * (kNostrilRim - v.ring));
+    if (v.strip == Strip::mouth && v.hold == Hold::skin) f *= clamp01(2 * (kLipBorder - 0.4 - v.ring));
+    if (v.strip == Strip::eye && v.ring < kLidCrease) f = clamp01(1.6 * (kLidCrease - 0.2 - v.ring));
+    free.push_back(f);
+  }
+  // The hair line is a drawn curve: its vertices touch both.
+  std::vector<int> touches(n, 0);
+  for (const Polygon& polygon : mesh.polygons)
+    for (const int c : polygon.corners)
+      touches[static_cast<std::size_t>(c)] |= polygon.material == Material::hair ? 1 : 2;
+  for (std::size_t i = 0; i < n; ++i)
+    if (touches[i] == 3) free[i] = 0;
+  for (int round = 0; round < 2 * rounds; ++round) {
+    const double strength = round % 2 == 0 ? 0.50 : -0.53;
+    std::vector<Vec3> sum(n);
+    std::vector<double> count(n, 0);
+    for (const Polygon& polygon : mesh.polygons)
+      for (std::size_t i = 0; i < polygon.corners.size(); ++i) {
+        const auto a = static_cast<std::size_t>(polygon.corners[i]);
+        const auto b = static_cast<std::size_t>(polygon.corners[(i + 1) % polygon.corners.size()]);
+        sum[a] = sum[a] + mesh.vertices[b].position;
+        sum[b] = sum[b] + mesh.vertices[a].position;
+        count[a] += 1;
+        count[b] += 1;
+      }
+    for (std::size_t i = 0; i < n; ++i) {
+      HalfVertex& v = mesh.vertices[i];
+      if (free[i] == 0) continue;
+      v.position = lerp(v.position, sum[i] * (1 / count[i]), strength * free[i]);
+      if (v.midline) v.position.x = 0;
+    }
   }
 }
 

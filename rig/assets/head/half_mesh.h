@@ -1,6 +1,7 @@
 // The left half of the skin while it is being made: polygons over vertices that know how they are held in place.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,7 @@ struct HalfVertex {
   Strip strip = Strip::none;
   double ring = 0, around = 0;
   bool midline = false;
+  Vec3 tint{1, 1, 1};   // linear factors of the material's colour
   bool border = false;  // lower end of the neck: keeps its height
 };
 
@@ -46,6 +48,7 @@ enum class Material : unsigned char {
 struct Polygon {
   std::vector<int> corners;  // counter-clockwise seen from outside
   Material material = Material::skin;
+  std::vector<std::array<double, 2>> uv;  // of each corner, or empty so far
 };
 
 struct HalfMesh {
@@ -66,6 +69,10 @@ void raiseHair(HalfMesh& mesh, double thickness);
 
 // Sinks the skin within the nostrils' rims.
 void sinkNostrils(HalfMesh& mesh);
+
+// Takes small unevenness out of the skin without shrinking it (Taubin, "A signal processing approach to fair surface
+// design", 1995); lids, lips, nostrils, ears and the neck's border stay.
+void polish(HalfMesh& mesh, int rounds);
 
 // Evens out the skin vertices: each moves toward the middle of its neighbours by `strength` and back onto the field.
 void relax(HalfMesh& mesh, int rounds, double strength);

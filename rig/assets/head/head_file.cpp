@@ -1,6 +1,8 @@
 // The head as text: OBJ, its MTL, and the feature points.
+#include <array>
 #include <charconv>
 #include <cmath>
+#include <map>
 
 #include "rig/assets/head/head_mesh.h"
 
@@ -16,6 +18,9 @@ void appendNumber(std::string& out, double value, int decimals) {
   const auto end = std::to_chars(buffer, buffer + sizeof buffer, value, std::chars_format::fixed, decimals).ptr;
   out.append(buffer, end);
 }
+
+// sRGB, as files with colours behind the coordinates have them.
+double displayFromLinear(double x) { return x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055; }
 
 }  // namespace
 
@@ -61,15 +66,35 @@ std::string objText(const Head& head, const std::string& mtl_file) {
   std::string out = "# " + head.character.name +
                     ", made by volto-make-head; centimetres, +x the subject's left, +y up, +z out of the face\n";
   out += "mtllib " + mtl_file + "\n";
-  for (const Vec3& v : head.vertices) {
+  for (std::size_t i = 0; i < head.vertices.size(); ++i) {
+    const Vec3 &v = head.vertices[i], &tint = head.tints[i];
     out += "v ";
     appendNumber(out, v.x, 5);
     out += ' ';
     appendNumber(out, v.y, 5);
     out += ' ';
     appendNumber(out, v.z, 5);
+    for (const double factor : {tint.x, tint.y, tint.z}) {
+      out += ' ';
+      appendNumber(out, displayFromLinear(factor), 3);
+    }
     out += '\n';
   }
+  // Texture coordinates in the order of their first use, each once.
+  std::map<std::array<long, 2>, int> texture;
+  const auto textureIndex = [&](const std::array<double, 2>& uv) {
+    const std::array<long, 2> key{std::lround(uv[0] * 1e5), std::lround(uv[1] * 1e5)};
+    return texture.try_emplace(key, static_cast<int>(texture.size()) + 1);
+  };
+  for (const Polygon& polygon : head.polygons)
+    for (const auto& uv : polygon.uv)
+      if (textureIndex(uv).second) {
+        out += "vt ";
+        appendNumber(out, uv[0], 5);
+        out += ' ';
+        appendNumber(out, uv[1], 5);
+        out += '\n';
+      }
   for (std::size_t c = 0; c < head.components.size(); ++c) {
     out += "g " + head.components[c].name + "\n";
     for (std::size_t m = 0; m < static_cast<std::size_t>(Material::count); ++m) {
@@ -80,7 +105,9 @@ std::string objText(const Head& head, const std::string& mtl_file) {
         if (!named) out += "usemtl " + materialName(static_cast<Material>(m)) + "\n";
         named = true;
         out += 'f';
-        for (const int corner : head.polygons[p].corners) out += ' ' + std::to_string(corner + 1);
+        for (std::size_t i = 0; i < head.polygons[p].corners.size(); ++i)
+          out += ' ' + std::to_string(head.polygons[p].corners[i] + 1) + '/' +
+                 std::to_string(textureIndex(head.polygons[p].uv[i]).first->second);
         out += '\n';
       }
     }

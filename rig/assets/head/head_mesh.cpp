@@ -6,6 +6,8 @@
 
 #include "rig/assets/head/parts.h"
 #include "rig/assets/head/skin_field.h"
+#include "rig/assets/head/texture.h"
+#include "rig/assets/head/tint.h"
 #include "rig/feature_points.h"
 
 namespace volto::head {
@@ -18,6 +20,7 @@ void append(Head& head, const HalfMesh& half, const std::string& name) {
   for (std::size_t i = 0; i < half.vertices.size(); ++i) {
     left[i] = static_cast<int>(head.vertices.size());
     head.vertices.push_back(half.vertices[i].position);
+    head.tints.push_back(half.vertices[i].tint);
     head.mirror.push_back(left[i]);
   }
   for (std::size_t i = 0; i < half.vertices.size(); ++i) {
@@ -28,6 +31,7 @@ void append(Head& head, const HalfMesh& half, const std::string& name) {
     const Vec3 p = half.vertices[i].position;
     right[i] = static_cast<int>(head.vertices.size());
     head.vertices.push_back({-p.x, p.y, p.z});
+    head.tints.push_back(half.vertices[i].tint);
     head.mirror.push_back(left[i]);
     head.mirror[static_cast<std::size_t>(left[i])] = right[i];
   }
@@ -37,8 +41,12 @@ void append(Head& head, const HalfMesh& half, const std::string& name) {
       out.material = polygon.material;
       for (const int c : polygon.corners)
         out.corners.push_back((side == 0 ? left : right)[static_cast<std::size_t>(c)]);
+      for (const auto& [u, v] : polygon.uv) out.uv.push_back({side == 0 ? u : 1 - u, v});
       // The same corner first, so that triangulated polygons mirror too.
-      if (side == 1) std::reverse(out.corners.begin() + 1, out.corners.end());
+      if (side == 1) {
+        std::reverse(out.corners.begin() + 1, out.corners.end());
+        std::reverse(out.uv.begin() + 1, out.uv.end());
+      }
       head.polygons.push_back(out);
       head.polygon_component.push_back(component);
     }
@@ -154,25 +162,44 @@ void placeFeaturePoints(Head& head, const HalfMesh& skin) {
   }
 }
 
+// What all characters begin with, made once: the adult's skin without hair and with texture coordinates.
+const HalfMesh& plainSkin() {
+  static const HalfMesh made = [] {
+    HalfMesh skin = makeCage();
+    relax(skin, 8, 0.5);
+    skin = split(skin);
+    relax(skin, 8, 0.5);
+    skin = split(skin);
+    relax(skin, 8, 0.5);
+    polish(skin, 3);
+    unwrapSkin(skin);
+    return skin;
+  }();
+  return made;
+}
+
 }  // namespace
 
 Head makeHead(const Character& character) {
-  HalfMesh skin = makeCage();
-  relax(skin, 8, 0.5);
-  skin = split(skin);
-  relax(skin, 8, 0.5);
-  skin = split(skin);
-  relax(skin, 8, 0.5);
-  raiseHair(skin, character.proportions.hair_thickness);
-  sinkNostrils(skin);
+  HalfMesh skin = plainSkin();
   if (character.proportions.hair_thickness == 0)
     for (Polygon& polygon : skin.polygons)
       if (polygon.material == Material::hair) polygon.material = Material::skin;
-
+  tintSkin(character.tints, skin);
+  raiseHair(skin, character.proportions.hair_thickness);
+  sinkNostrils(skin);
   const Proportions& proportions = character.proportions;
   HalfMesh reshaped_skin = skin, eyeball = makeEyeball(proportions.iris_size, proportions.pupil_size);
   HalfMesh upper_teeth = makeUpperTeeth(), lower_teeth = makeLowerTeeth(), tongue = makeTongue();
   HalfMesh lashes = makeUpperLashes(), brow = makeBrow();
+  tintEyeball(eyeball);
+  for (HalfMesh* part : {&upper_teeth, &lower_teeth, &tongue}) tintMouthPart(*part);
+  placeChart(eyeball, Chart::eyeball);
+  placeChart(upper_teeth, Chart::upper_teeth);
+  placeChart(lower_teeth, Chart::lower_teeth);
+  placeChart(tongue, Chart::tongue);
+  placeChart(lashes, Chart::lashes);
+  placeChart(brow, Chart::brow);
   reshape(proportions, reshaped_skin);
   for (HalfMesh* part : {&upper_teeth, &lower_teeth, &tongue, &lashes}) reshape(proportions, *part);
   reshapeOnSkin(proportions, skin, reshaped_skin, brow);

@@ -21,6 +21,7 @@ struct Component {
 struct Head {
   Character character;
   std::vector<Vec3> vertices;     // centimetres, +x subject's left, +y up, +z out of the face
+  std::vector<Vec3> tints;        // linear factors of the materials' colours, 0..1
   std::vector<int> mirror;        // vertex of the other side; itself on the midline
   std::vector<Polygon> polygons;  // grouped by component, counter-clockwise from outside
   std::vector<int> polygon_component;

@@ -10,6 +10,11 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
+// Local texture coordinates of a polygon: upper left corner first, counter-clockwise.
+std::vector<std::array<double, 2>> rectangle(double left, double top, double right, double bottom) {
+  return {{left, top}, {left, bottom}, {right, bottom}, {right, top}};
+}
+
 // A sheet of rows x columns quads; rows or columns may close on themselves. `at(r, c)` gives the vertex; seen from
 // outside, rows run down and columns to the right.
 template <typename At, typename MaterialOf>
@@ -22,7 +27,9 @@ void addSheet(HalfMesh& mesh, int rows, int columns, bool rows_closed, bool colu
   const auto index = [&](int r, int c) { return first + (r % row_count) * column_count + c % column_count; };
   for (int r = 0; r < rows; ++r)
     for (int c = 0; c < columns; ++c)
-      mesh.polygons.push_back({{index(r, c), index(r + 1, c), index(r + 1, c + 1), index(r, c + 1)}, material(r, c)});
+      mesh.polygons.push_back({{index(r, c), index(r + 1, c), index(r + 1, c + 1), index(r, c + 1)},
+                               material(r, c),
+                               rectangle(c, -r, c + 1, -r - 1)});
 }
 
 HalfVertex vertex(const Vec3& p, bool midline = false) {
@@ -43,9 +50,9 @@ void addFan(HalfMesh& mesh, const std::vector<int>& ring, const Vec3& pole, bool
   for (std::size_t i = 0; i < n; ++i) {
     const int a = ring[i], b = ring[(i + 1) % n];
     if (facing_ring_order)
-      mesh.polygons.push_back({{centre, a, b}, material});
+      mesh.polygons.push_back({{centre, a, b}, material, {}});
     else
-      mesh.polygons.push_back({{centre, b, a}, material});
+      mesh.polygons.push_back({{centre, b, a}, material, {}});
   }
 }
 
@@ -109,16 +116,20 @@ HalfMesh makeTeeth(const Arch& arch, double width_scale) {
   // Back of the gum, and the far end.
   const auto index = [&](int row, int column) { return row * (kColumns + 1) + column; };
   for (int c = 0; c < kColumns; ++c)
-    mesh.polygons.push_back(
-        {{index(kProfile, c), index(0, c), index(0, c + 1), index(kProfile, c + 1)}, Material::gums});
+    mesh.polygons.push_back({{index(kProfile, c), index(0, c), index(0, c + 1), index(kProfile, c + 1)},
+                             Material::gums,
+                             rectangle(c, -kProfile, c + 1, -kProfile - 1)});
   std::vector<int> end;
   for (int r = 0; r <= kProfile; ++r) end.push_back(index(r, kColumns));
   for (std::size_t i = 0; i + 1 < 5; ++i)
     mesh.polygons.push_back(
-        {{end[i], end[i + 1], end[9 - (i + 1)], end[9 - i]}, i == 0 ? Material::gums : Material::teeth});
+        {{end[i], end[i + 1], end[9 - (i + 1)], end[9 - i]},
+         i == 0 ? Material::gums : Material::teeth,
+         rectangle(kColumns + 1, -static_cast<double>(i), kColumns + 3, -static_cast<double>(i) - 1)});
   if (towards_edge > 0)  // profile runs the other way round: turn the polygons
     for (Polygon& polygon : mesh.polygons) {
       std::swap(polygon.corners[1], polygon.corners[3]);
+      std::swap(polygon.uv[1], polygon.uv[3]);
     }
   return mesh;
 }
@@ -161,6 +172,20 @@ HalfMesh makeEyeball(double iris_size, double pupil_size) {
   }
   addFan(mesh, front, kEyeCentre + Vec3{0, 0, kEyeRadius}, true, Material::pupil);
   addFan(mesh, back, kEyeCentre - Vec3{0, 0, kEyeRadius}, false, Material::eye_white);
+  // Seen from in front, the distance from the middle growing with the angle as far as the pole behind.
+  for (Polygon& polygon : mesh.polygons) {
+    const auto outward = [&](int v) { return mesh.vertices[static_cast<std::size_t>(v)].position - kEyeCentre; };
+    Vec3 middle;
+    for (const int c : polygon.corners) middle = middle + outward(c);
+    polygon.uv.clear();
+    for (const int c : polygon.corners) {
+      const Vec3 d = outward(c);
+      const double flat = std::sqrt(d.x * d.x + d.y * d.y), angle = std::atan2(flat, d.z);
+      const bool behind = angle > kPi - 1e-6;
+      const Vec3 way = normalized(behind ? Vec3{middle.x, middle.y, 0} : Vec3{d.x, d.y, 0});
+      polygon.uv.push_back({way.x * angle, way.y * angle});
+    }
+  }
   return mesh;
 }
 
@@ -188,11 +213,14 @@ HalfMesh makeTongue() {
   mesh.vertices.push_back(vertex({0, -7.55, 8.05}, true));
   for (int c = 0; c < kAround; ++c) {
     const int row = kAlong * (kAround + 1);
-    mesh.polygons.push_back({{row + c, centre, row + c + 1}, Material::tongue});
+    mesh.polygons.push_back({{row + c, centre, row + c + 1},
+                             Material::tongue,
+                             {{c + 0.0, -kAlong}, {c + 0.5, -kAlong - 1}, {c + 1.0, -kAlong}}});
   }
   const int root = static_cast<int>(mesh.vertices.size());
   mesh.vertices.push_back(vertex({0, -7.43, 4.9}, true));
-  for (int c = 0; c < kAround; ++c) mesh.polygons.push_back({{root, c, c + 1}, Material::tongue});
+  for (int c = 0; c < kAround; ++c)
+    mesh.polygons.push_back({{root, c, c + 1}, Material::tongue, {{c + 0.5, 1}, {c + 0.0, 0}, {c + 1.0, 0}}});
   return mesh;
 }
 
@@ -217,9 +245,12 @@ HalfMesh makeUpperLashes() {
   addSheet(
       mesh, 4, kSteps, true, false, [&](int r, int c) { return at((4 - r) % 4, c); },
       [](int, int) { return Material::lashes; });
-  mesh.polygons.push_back({{3 * (kSteps + 1), 2 * (kSteps + 1), kSteps + 1, 0}, Material::lashes});
+  mesh.polygons.push_back(
+      {{3 * (kSteps + 1), 2 * (kSteps + 1), kSteps + 1, 0}, Material::lashes, rectangle(-2, -1, -1, -3)});
   const int e = kSteps;
-  mesh.polygons.push_back({{e, e + kSteps + 1, e + 2 * (kSteps + 1), e + 3 * (kSteps + 1)}, Material::lashes});
+  mesh.polygons.push_back({{e, e + kSteps + 1, e + 2 * (kSteps + 1), e + 3 * (kSteps + 1)},
+                           Material::lashes,
+                           rectangle(kSteps + 1, -1, kSteps + 2, -3)});
   return mesh;
 }
 
@@ -227,7 +258,7 @@ Vec3 browLine(double t) {
   // Quadratic through the inner end, the peak and the outer end.
   const double x = lerp(1.05, 5.15, t);
   const double past = (t - 0.64) / 0.36;
-  const double y = t < 0.64 ? lerp(2.20, 2.52, std::sin(t / 0.64 * kPi / 2)) : 2.52 - 0.55 * past * past;
+  const double y = t < 0.64 ? lerp(2.26, 2.54, std::sin(t / 0.64 * kPi / 2)) : 2.54 - 0.55 * past * past;
   return castToSkin({x, y, 16}, {0, 0, -1});
 }
 
@@ -238,13 +269,13 @@ HalfMesh makeBrow() {
   const auto at = [&](int row, int column) {
     const double t = static_cast<double>(column) / kSteps;
     const Vec3 middle = browLine(t);
-    const double half = 0.27 * (1 - 0.86 * smoothstep(0.25, 1.0, t)) * (0.30 + 0.70 * smoothstep(0.0, 0.20, t));
+    const double half = 0.25 * (1 - 0.86 * smoothstep(0.25, 1.0, t)) * (0.50 + 0.50 * smoothstep(0.0, 0.15, t));
     const bool front = row <= kAcross;
     const double s =
         front ? 1 - 2.0 * row / kAcross : -1 + 2.0 * (row - kAcross) / kAcross;  // 1 upper edge, -1 lower edge
     const Vec3 on_skin = castToSkin({middle.x, middle.y + half * s, 16}, {0, 0, -1});
     const Vec3 n = normalized(skinGradient(on_skin));
-    return vertex(on_skin + n * (0.035 + (front ? 0.05 * (1 - s * s) * (0.3 + 0.7 * half / 0.27) : 0.0)));
+    return vertex(on_skin + n * (0.035 + (front ? 0.05 * (1 - s * s) * (0.3 + 0.7 * half / 0.25) : 0.0)));
   };
   addSheet(mesh, 2 * kAcross, kSteps, true, false, at, [](int, int) { return Material::brows; });
   const auto index = [&](int r, int c) { return (r % (2 * kAcross)) * (kSteps + 1) + c; };
@@ -252,10 +283,21 @@ HalfMesh makeBrow() {
     const int back = 2 * kAcross - r;
     std::vector<int> inner{index(r, 0), index(back, 0), index(back - 1, 0), index(r + 1, 0)};
     std::vector<int> outer{index(r + 1, kSteps), index(back - 1, kSteps), index(back, kSteps), index(r, kSteps)};
-    if (r == 0) inner.erase(inner.begin() + 1), outer.erase(outer.begin() + 2);
-    if (r + 1 == kAcross) inner.erase(inner.begin() + 2), outer.erase(outer.begin() + 1);
-    mesh.polygons.push_back({inner, Material::brows});
-    mesh.polygons.push_back({outer, Material::brows});
+    // (counter-clockwise: towards the back, down, forward)
+    std::vector<std::array<double, 2>> inner_uv{{-1, 0.0 - r}, {-2, 0.0 - r}, {-2, -1.0 - r}, {-1, -1.0 - r}};
+    constexpr double kRight = kSteps + 1;
+    std::vector<std::array<double, 2>> outer_uv{
+        {kRight, -1.0 - r}, {kRight + 1, -1.0 - r}, {kRight + 1, 0.0 - r}, {kRight, 0.0 - r}};
+    const auto leaveOut = [&](std::ptrdiff_t of_inner, std::ptrdiff_t of_outer) {
+      inner.erase(inner.begin() + of_inner);
+      inner_uv.erase(inner_uv.begin() + of_inner);
+      outer.erase(outer.begin() + of_outer);
+      outer_uv.erase(outer_uv.begin() + of_outer);
+    };
+    if (r == 0) leaveOut(1, 2);
+    if (r + 1 == kAcross) leaveOut(2, 1);
+    mesh.polygons.push_back({inner, Material::brows, inner_uv});
+    mesh.polygons.push_back({outer, Material::brows, outer_uv});
   }
   return mesh;
 }

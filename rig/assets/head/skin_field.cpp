@@ -95,6 +95,7 @@ double skinDistance(const Vec3& point) {
   nose = melt(nose, ellipsoid(p, {0, -3.36, 10.40}, {0.92, 0.74, 0.78}), 0.6);
   nose = melt(nose, ellipsoid(m, {1.00, -3.80, 9.45}, {0.56, 0.60, 0.90}), 0.8);
   nose = melt(nose, limb(p, {0, -3.9, 10.3}, 0.40, {0, -4.42, 9.5}, 0.46), 0.6);
+  nose = melt(nose, ellipsoid(p, {0, 1.45, 8.05}, {0.72, 1.2, 0.88}), 0.9);  // up into the forehead
   d = melt(d, nose, 0.9);
 
   // The skin that folds over the upper lid, and the lids: they lie on a sphere a little larger than the eyeball. The

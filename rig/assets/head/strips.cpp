@@ -74,16 +74,16 @@ Vec3 eyePoint(double ring, double around) {
   const double keep = kEyeRadius + kLidGap;
   const Vec3 back = normalized(front) * std::fmax(keep, length(front) - 1.15 * kLidThickness);
   if (ring <= kLidMarginBack) return kEyeCentre + lerp(front, back, ring - kLidMarginFront);
-  // Behind the lids: along the eyeball, away from the opening's axis. In the corners there is nothing to go behind.
+  // Behind the lids: along the eyeball, away from the opening's axis; in the corners down to the ball, in
+  // the inner one a little towards the axis, as the caruncle does.
   const double phase = around / 8 - std::floor(around / 8);
-  const double behind = smoothstep(0.04, 0.22, std::fmin(phase, 1 - phase));
-  const double flat = std::sqrt(back.x * back.x + back.y * back.y),
-               angle = std::atan2(flat, back.z) + 0.03 + 0.34 * behind;
-  const Vec3 deep =
-      Vec3{back.x / flat * std::sin(angle), back.y / flat * std::sin(angle), std::cos(angle)} * (keep + 0.03 * behind);
-  Vec3 p = lerp(back, deep, clamp01(ring - kLidMarginBack));
-  if (length(p) < keep) p = normalized(p) * keep;
-  return kEyeCentre + p;
+  const double open = smoothstep(0.04, 0.22, std::fmin(phase, 1 - phase)), t = clamp01(ring - kLidMarginBack);
+  const bool inner = around < 4 || around > 12;
+  const double flat = std::sqrt(back.x * back.x + back.y * back.y);
+  const double angle = std::atan2(flat, back.z) + lerp(inner ? -0.08 : 0.03, 0.36, open) * t;
+  const double radius = lerp(length(back), keep + 0.03 * open, t);
+  return kEyeCentre + Vec3{back.x / flat * std::sin(angle), back.y / flat * std::sin(angle), std::cos(angle)} *
+                          std::fmax(keep, radius);
 }
 
 // --- Mouth
@@ -92,9 +92,9 @@ Vec3 eyePoint(double ring, double around) {
 constexpr double kMouthGap = 0.005;  // half of the hair's gap between the closed lips
 // 11 knots from the middle of the upper lip over the corner to the middle of the lower lip.
 constexpr double kBorderX[11] = {0.0, 0.46, 1.02, 1.60, 2.12, 2.50, 2.12, 1.62, 1.07, 0.53, 0.0};
-constexpr double kBorderY[11] = {-5.98, -5.86, -5.98, -6.18, -6.37, -6.50, -6.86, -7.20, -7.42, -7.52, -7.54};
+constexpr double kBorderY[11] = {-5.98, -5.86, -5.98, -6.18, -6.36, -6.485, -6.85, -7.20, -7.42, -7.52, -7.54};
 constexpr double kRimX[11] = {0.0, 0.48, 1.0, 1.52, 1.98, 2.34, 1.98, 1.52, 1.0, 0.48, 0.0};
-constexpr double kRimY[11] = {-6.69, -6.64, -6.59, -6.60, -6.57, -6.505, -6.58, -6.60, -6.59, -6.64, -6.69};
+constexpr double kRimY[11] = {-6.69, -6.64, -6.59, -6.60, -6.56, -6.49, -6.57, -6.60, -6.59, -6.64, -6.69};
 constexpr double kRimBack[11] = {0.20, 0.21, 0.22, 0.22, 0.19, 0.15, 0.19, 0.22, 0.22, 0.20, 0.20};
 constexpr double kFullness[11] = {0.42, 0.4, 0.35, 0.25, 0.11, 0.0, 0.11, 0.29, 0.42, 0.47, 0.49};
 
