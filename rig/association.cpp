@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 
 #include "rig/closest_point.h"
+#include "rig/parallel.h"
 
 namespace volto::rig {
 namespace {
@@ -15,17 +16,16 @@ constexpr double kNearEs = 0.03;
 
 struct MaskFace {
   Eigen::Vector3d a, ab, ac, normal;
-  std::array<std::uint8_t, 3> points;
+  MaskGeometry::Triangle points;
   SlitSide side;
 };
 
-std::vector<MaskFace> maskFaces(const FeaturePointPositions& points) {
+std::vector<MaskFace> maskFaces(const MaskGeometry& mask) {
   std::vector<MaskFace> faces;
-  const auto triangles = maskTriangles();
-  for (std::size_t t = 0; t < triangles.size(); ++t) {
-    const auto& ids = triangles[t];
-    const Eigen::Vector3d a = points.row(ids[0]), b = points.row(ids[1]), c = points.row(ids[2]);
-    faces.push_back({a, b - a, c - a, (b - a).cross(c - a), ids, slitSideOfTriangle(t)});
+  for (std::size_t t = 0; t < mask.triangles.size(); ++t) {
+    const auto& ids = mask.triangles[t];
+    const Eigen::Vector3d a = mask.points.row(ids[0]), b = mask.points.row(ids[1]), c = mask.points.row(ids[2]);
+    faces.push_back({a, b - a, c - a, (b - a).cross(c - a), ids, mask.triangle_side[t]});
   }
   return faces;
 }
@@ -55,9 +55,8 @@ bool intersect(const MaskFace& face, const Eigen::Vector3d& p, const Eigen::Vect
 
 class Associator {
  public:
-  Associator(const Mesh& mesh, const Skin& skin, const FeaturePointPositions& points, double eye_separation,
-             SkinAssociation& out)
-      : mesh_(mesh), skin_(skin), points_(points), es_(eye_separation), faces_(maskFaces(points)), out_(out) {}
+  Associator(const Mesh& mesh, const Skin& skin, const MaskGeometry& mask, double eye_separation, SkinAssociation& out)
+      : mesh_(mesh), skin_(skin), mask_(mask), es_(eye_separation), faces_(maskFaces(mask)), out_(out) {}
 
   // The closest triangle that the vertex's normal meets, that faces the same way, on the same lip or lid, and that is
   // near along the skin.
@@ -103,16 +102,14 @@ class Associator {
   }
 
   // The triangle at the feature point with the shortest path; of those, the one whose other points are nearest.
-  void byPath(std::uint32_t v, const RegionsOfInfluence& regions) {
-    Eigen::Index nearest = 0;
+  void byPath(std::uint32_t v, std::size_t nearest, const RegionsOfInfluence& regions) {
     const auto distances = out_.point_distance.row(v);
-    if (!(distances.minCoeff(&nearest) < kUnreached)) return;
     double best = std::numeric_limits<double>::infinity();
-    const SlitSide side = slitSide(static_cast<std::size_t>(nearest));
-    for (const std::uint8_t t : regions.triangles_of_point[static_cast<std::size_t>(nearest)]) {
+    const SlitSide side = mask_.point_side[nearest];
+    for (const std::uint8_t t : regions.triangles_of_point[nearest]) {
       if (opposite(side, faces_[t].side)) continue;
       double sum = 0;
-      for (const std::uint8_t q : faces_[t].points) sum += std::min<double>(distances[q], 10 * es_);
+      for (const std::uint16_t q : faces_[t].points) sum += std::min<double>(distances[q], 10 * es_);
       if (sum >= best) continue;
       best = sum;
       out_.triangle[v] = t;
@@ -127,7 +124,7 @@ class Associator {
     if (side == SlitSide::none) return false;
     float own = kUnreached, other = kUnreached;
     for (std::size_t p = 0; p < kFeaturePointCount; ++p) {
-      const SlitSide of_point = slitSide(p);
+      const SlitSide of_point = mask_.point_side[p];
       if (of_point == side) own = std::min(own, out_.point_distance(v, static_cast<Eigen::Index>(p)));
       if (opposite(of_point, side)) other = std::min(other, out_.point_distance(v, static_cast<Eigen::Index>(p)));
     }
@@ -136,8 +133,8 @@ class Associator {
 
   bool nearAlongSkin(std::uint32_t v, const MaskFace& face, const Hit& hit) const {
     const Eigen::Vector3d q = face.a + hit.barycentric[1] * face.ab + hit.barycentric[2] * face.ac;
-    for (const std::uint8_t p : face.points) {
-      const double air = (points_.row(p).transpose() - q).norm();
+    for (const std::uint16_t p : face.points) {
+      const double air = (mask_.points.row(p).transpose() - q).norm();
       if (out_.point_distance(v, p) > 2.2 * air + 2.0 * hit.distance + 0.08 * es_) return false;
     }
     return true;
@@ -145,7 +142,7 @@ class Associator {
 
   const Mesh& mesh_;
   const Skin& skin_;
-  const FeaturePointPositions& points_;
+  const MaskGeometry& mask_;
   double es_;
   std::vector<MaskFace> faces_;
   SkinAssociation& out_;
@@ -154,7 +151,7 @@ class Associator {
 }  // namespace
 
 SkinAssociation associateSkin(const Mesh& mesh, const Skin& skin, const std::vector<bool>& is_skin,
-                              const FeaturePointPositions& points, const SkinPoints& on_skin, double eye_separation,
+                              const MaskGeometry& mask, const SkinPoints& on_skin, double eye_separation,
                               double fade_out) {
   const std::size_t vertices = mesh.vertexCount();
   SkinAssociation out;
@@ -167,19 +164,23 @@ SkinAssociation associateSkin(const Mesh& mesh, const Skin& skin, const std::vec
   out.point_distance.setConstant(static_cast<Eigen::Index>(vertices), static_cast<Eigen::Index>(kFeaturePointCount),
                                  kUnreached);
 
-  // Far enough that every vertex of a triangle, and every vertex that fades out, knows its points.
-  double longest_edge = 0;
-  for (const MaskTriangle& t : maskTriangles())
-    for (std::size_t i = 0; i < 3; ++i)
-      longest_edge = std::max(longest_edge, (points.row(t[i]) - points.row(t[(i + 1) % 3])).norm());
-  const auto limit = static_cast<float>(2 * longest_edge + fade_out + eye_separation);
-  for (std::size_t p = 0; p < kFeaturePointCount; ++p) {
-    const GeodesicDistances d = geodesicDistances(skin.graph, on_skin[p].around, limit);
+  // Far enough for what is asked of it: whether a ray to one of the point's triangles is near along the skin too, and
+  // how far the opposite lip or lid is in comparison.
+  std::array<float, kFeaturePointCount> limit{};
+  for (const MaskGeometry::Triangle& t : mask.triangles)
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::uint16_t a = t[i], b = t[(i + 1) % 3];
+      const auto reach = static_cast<float>(2.2 * (mask.points.row(a) - mask.points.row(b)).norm() + eye_separation);
+      for (const std::uint16_t p : {a, b}) limit[p] = std::max(limit[p], reach);
+    }
+  out.reach = *std::min_element(limit.begin(), limit.end());
+  parallelFor(kFeaturePointCount, [&](std::size_t p) {
+    const GeodesicDistances d = geodesicDistances(skin.graph, on_skin[p].around, limit[p]);
     for (std::size_t v = 0; v < vertices; ++v)
       out.point_distance(static_cast<Eigen::Index>(v), static_cast<Eigen::Index>(p)) = d.distance[v];
-  }
+  });
 
-  Associator associator(mesh, skin, points, eye_separation, out);
+  Associator associator(mesh, skin, mask, eye_separation, out);
   std::vector<GeodesicSource> covered;
   std::vector<std::uint32_t> left;
   for (std::uint32_t v = 0; v < vertices; ++v) {
@@ -195,9 +196,18 @@ SkinAssociation associateSkin(const Mesh& mesh, const Skin& skin, const std::vec
     for (const GeodesicSource& s : point.around)
       if (!out.on_mask[s.vertex]) covered.push_back(s);
   out.beyond = geodesicDistances(skin.graph, covered, static_cast<float>(fade_out)).distance;
-  const RegionsOfInfluence regions = regionsOfInfluence();
+  std::vector<GeodesicSource> sources;
+  std::vector<std::size_t> point_of_source;
+  for (std::size_t p = 0; p < on_skin.size(); ++p)
+    for (const GeodesicSource& s : on_skin[p].around) {
+      sources.push_back(s);
+      point_of_source.push_back(p);
+    }
+  const std::vector<std::int32_t> nearest = geodesicDistances(skin.graph, sources).nearest_source;
+  const RegionsOfInfluence regions = regionsOfInfluence(mask);
   for (const std::uint32_t v : left)
-    if (out.beyond[v] < kUnreached) associator.byPath(v, regions);
+    if (out.beyond[v] < kUnreached && nearest[v] >= 0)
+      associator.byPath(v, point_of_source[static_cast<std::size_t>(nearest[v])], regions);
   return out;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <Eigen/Geometry>
 
@@ -13,6 +14,7 @@
 #include "rig/part_motion.h"
 #include "rig/rigid_parts.h"
 #include "rig/skin_rows.h"
+#include "rig/subdivision.h"
 #include "rig/weld.h"
 
 namespace volto::rig {
@@ -75,14 +77,15 @@ void placePoints(const Mesh& mesh, const FeaturePointChoices& choices, Rig& rig)
   if (!(size > 1e-6 * mesh_size)) throw InputError("all feature points are in one place");
   for (std::size_t p = 0; p < kFeaturePointCount; ++p)
     for (std::size_t q = 0; q < p; ++q) {
+      // Closed lips and lids may touch, and may even be one vertex (rig/rig_health.h tells); nothing else may.
+      if (opposite(slitSide(p), slitSide(q))) continue;
       if (rig.feature_vertex[p] >= 0 && rig.feature_vertex[p] == rig.feature_vertex[q])
         throw InputError("feature points " + idOf(q) + " and " + idOf(p) + " are the same vertex " +
                          std::to_string(rig.feature_vertex[p]));
       const double apart = (rig.feature_positions.row(static_cast<Eigen::Index>(p)) -
                             rig.feature_positions.row(static_cast<Eigen::Index>(q)))
                                .norm();
-      // Closed lips and lids may touch; nothing else may.
-      if (apart <= 1e-9 * size && !opposite(slitSide(p), slitSide(q)))
+      if (apart <= 1e-9 * size)
         throw InputError("feature points " + idOf(q) + " and " + idOf(p) + " are in the same place");
     }
 }
@@ -134,7 +137,7 @@ SkinPoints pointsOnSkin(const Mesh& mesh, const Skin& skin, const std::vector<bo
     if (is_skin[skin.component[t[0]]]) triangles.push_back(t);
   if (triangles.empty()) throw InputError("the feature points are on no face of the mesh");
   const ClosestPoint surface(mesh.positions, std::move(triangles));
-  SkinPoints out;
+  SkinPoints out(kFeaturePointCount);
   for (std::size_t p = 0; p < kFeaturePointCount; ++p) {
     if (rig.feature_vertex[p] >= 0) {
       out[p] = {{{skin.same_as[static_cast<std::size_t>(rig.feature_vertex[p])], 0.0F}}, {1.0}};
@@ -155,7 +158,7 @@ SkinPoints pointsOnSkin(const Mesh& mesh, const Skin& skin, const std::vector<bo
   }
   for (std::size_t p = 0; p < kFeaturePointCount; ++p)
     for (std::size_t q = 0; q < p; ++q)
-      if (out[p].isVertex() && out[q].isVertex() && out[p].around.front().vertex == out[q].around.front().vertex)
+      if (!opposite(slitSide(p), slitSide(q)) && out[p].isVertex() && out[q].isVertex() && out[p].around.front().vertex == out[q].around.front().vertex)
         throw InputError("feature points " + idOf(q) + " and " + idOf(p) + " are in the same place on the skin");
   return out;
 }
@@ -173,19 +176,64 @@ void turnNormalsOutward(const FeaturePointPositions& points, const SkinPoints& o
   if (agreement < 0) skin.normals = -skin.normals;
 }
 
-DeformationOperator compressed(const SkinRows& rows) {
-  DeformationOperator out;
-  out.row_start.reserve(rows.row_of_vertex.size() + 1);
-  out.row_start.push_back(0);
-  for (std::uint32_t v = 0; v < rows.row_of_vertex.size(); ++v) {
-    if (const OperatorRow* row = rows.find(v))
-      for (std::size_t p = 0; p < kFeaturePointCount; ++p)
-        if ((*row)[p] != 0) {
-          out.point.push_back(static_cast<std::uint8_t>(p));
-          out.weight.push_back(static_cast<float>((*row)[p]));
-        }
-    out.row_start.push_back(static_cast<std::uint32_t>(out.point.size()));
+// One row per vertex, the same for vertices that stand for each other.
+SparseRows perVertex(const SkinRows& rows) {
+  SparseRows out;
+  out.start.reserve(rows.row_of_vertex.size() + 1);
+  for (const std::int32_t r : rows.row_of_vertex) {
+    if (r >= 0) {
+      const auto points = rows.rows.points(static_cast<std::size_t>(r));
+      const auto weights = rows.rows.weights(static_cast<std::size_t>(r));
+      out.point.insert(out.point.end(), points.begin(), points.end());
+      out.weight.insert(out.weight.end(), weights.begin(), weights.end());
+    }
+    out.start.push_back(out.point.size());
   }
+  return out;
+}
+
+DeformationOperator compressed(const SkinRows& rows) {
+  const SparseRows all = perVertex(rows);
+  DeformationOperator out;
+  out.row_start.assign(all.start.begin(), all.start.end());
+  out.point.assign(all.point.begin(), all.point.end());
+  out.weight = all.weight;
+  return out;
+}
+
+// `skin_rows`: the operator of the 84 points before parts were placed; `all_rows`: with them.
+RefinedMask refinedMask(const SkinProblem& problem, const MaskOnSkin& mask, const SkinRows& skin_rows,
+                        const SkinRows& all_rows, const PlacedParts& placed, const Rig& rig) {
+  RefinedMask out;
+  out.positions = mask.geometry.points;
+  out.triangles = mask.geometry.triangles;
+  out.base_triangle = mask.geometry.base_triangle;
+  RowBuilder row(mask.geometry.pointCount());
+  for (std::size_t p = 0; p < mask.points.size(); ++p) {
+    if (p < kFeaturePointCount) {
+      out.vertex.push_back(rig.feature_vertex[p]);
+      row.add(p, 1.0);
+    } else {
+      const std::uint32_t v = mask.points[p].around.front().vertex;
+      out.vertex.push_back(static_cast<std::int32_t>(v));
+      if (skin_rows.moves(v)) row.addRow(skin_rows.rows, static_cast<std::size_t>(skin_rows.row_of_vertex[v]), 1.0);
+    }
+    row.finish(out.from_feature_points);
+  }
+  SkinRows rows = SkinInterpolation(problem, mask).rows();
+  // Parts: what follows the skin follows the refined skin; jaws and what else knows only feature points stays as it is.
+  for (std::uint32_t v = 0; v < rows.row_of_vertex.size(); ++v)
+    if (rows.row_of_vertex[v] < 0 && all_rows.moves(v)) {
+      row.addRow(all_rows.rows, static_cast<std::size_t>(all_rows.row_of_vertex[v]), 1.0);
+      rows.set(v, row);
+    }
+  for (const PlacedParts::Binding& binding : placed.bindings) {
+    for (const auto& [of, weight] : binding.of)
+      if (rows.moves(of)) row.addRow(rows.rows, static_cast<std::size_t>(rows.row_of_vertex[of]), weight);
+    row.dropSmall();
+    rows.set(binding.vertex, row);
+  }
+  out.to_vertices = perVertex(rows);
   return out;
 }
 
@@ -234,27 +282,48 @@ Rig buildRig(const Mesh& neutral, const FeaturePointChoices& points, const RigOp
     throw InputError(std::string("the feature points are not those of a face: ") + e.what());
   }
 
-  Skin skin = prepareSkin(neutral, weldSeams(neutral, slits(rig.feature_positions)));
+  const std::vector<Slit> closed = slits(rig.feature_positions);
+  std::vector<std::uint32_t> same_as = weldSeams(neutral, closed);
+  const std::vector<TVertex> t_vertices = findTVertices(neutral, same_as, closed);
+  const Mesh joined = t_vertices.empty() ? Mesh() : joinTVertices(neutral, same_as, t_vertices);
+  Skin skin = prepareSkin(neutral, t_vertices.empty() ? neutral : joined, std::move(same_as));
   const std::vector<bool> is_skin = skinComponents(neutral, skin, rig);
   const SkinPoints on_skin = pointsOnSkin(neutral, skin, is_skin, rig);
   turnNormalsOutward(rig.feature_positions, on_skin, skin);
 
-  SkinAssociation association = associateSkin(neutral, skin, is_skin, rig.feature_positions, on_skin, eye_separation,
-                                              options.fade_out_es * eye_separation);
-  SkinRows rows =
-      skinRows(neutral, skin, association, rig.feature_positions, on_skin, eye_separation, options.blend_width);
+  const MaskGeometry mask = controlMaskGeometry(rig.feature_positions, options.edits);
+  SkinAssociation association =
+      associateSkin(neutral, skin, is_skin, mask, on_skin, eye_separation, options.fade_out_es * eye_separation);
+  const SkinProblem problem{neutral, skin, association, on_skin, eye_separation, options.blend_width, options.edits,
+                            t_vertices};
+  const MaskOnSkin control = controlMaskOnSkin(problem, mask);
+  SkinRows rows = SkinInterpolation(problem, control).rows();
+  const SkinRows skin_rows = options.subdivision.any() ? rows : SkinRows{};
+  std::optional<MaskOnSkin> refined;
+  if (options.subdivision.any()) refined = subdivide(problem, control, options.subdivision, options.examples);
+
   for (std::uint32_t v = 0; v < neutral.vertexCount(); ++v) {
     association.triangle[v] = association.triangle[skin.same_as[v]];
-    association.kind[v] = association.kind[skin.same_as[v]];
     association.side[v] = association.side[skin.same_as[v]];
   }
-  rig.rigid_parts = placeParts(neutral, skin, is_skin, {rig.feature_positions, rig.mesh_from_head, eye_separation},
-                               association, rows);
+  const std::vector<AssociationKind> skin_kind = association.kind;
+  for (std::uint32_t v = 0; v < neutral.vertexCount(); ++v) association.kind[v] = skin_kind[skin.same_as[v]];
+  const PlacedParts placed = placeParts(neutral, skin, is_skin,
+                                        {rig.feature_positions, rig.mesh_from_head, eye_separation}, options.parts,
+                                        association, rows);
   rig.deformation = compressed(rows);
+  if (refined) {
+    std::vector<AssociationKind> all_kinds = std::exchange(association.kind, skin_kind);  // its equations are the skin's
+    rig.refined = refinedMask(problem, *refined, skin_rows, rows, placed, rig);
+    association.kind = std::move(all_kinds);
+  }
+  rig.rigid_parts = placed.parts;
   rig.contacts = findContacts(rig, skin, association, on_skin);
   rig.association.triangle = std::move(association.triangle);
   rig.association.kind = std::move(association.kind);
-  rig.region_of_influence = regionsOfInfluence().points;
+  const RegionsOfInfluence regions = regionsOfInfluence(mask, options.edits);
+  for (std::size_t t = 0; t < kMaskTriangleCount; ++t)
+    rig.region_of_influence[t].assign(regions.points[t].begin(), regions.points[t].end());
   rig.blendshapes = arkitBlendshapes(rig);
   rig.part_motions = partMotions(rig);
   makeCorrections(rig, skin);

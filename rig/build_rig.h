@@ -10,6 +10,7 @@
 
 #include "rig/errors.h"
 #include "rig/rig.h"
+#include "rig/rig_options.h"
 
 namespace volto::rig {
 
@@ -19,17 +20,6 @@ using FeaturePointChoices = std::map<std::size_t, FeaturePointChoice>;  // key: 
 
 // {"feature_points": {"2.1": 4711, "3.7": [x, y, z], ...}}. Throws InputError with file, line or key.
 FeaturePointChoices parseFeaturePoints(std::string_view json, const std::string& name_for_errors);
-
-struct RigOptions {
-  std::string name;       // character name; empty: mesh_file without its extension
-  std::string mesh_file;  // file name of the mesh, for people
-  // How far beyond the mask's outline the skin still follows it, as a fraction of the eye separation (geodesic). 0.1
-  // to 5.
-  double fade_out_es = 1.2;
-  // Over how wide a band neighbouring regions of influence are blended, as a fraction of the local triangle size. 0
-  // to 5.
-  double blend_width = 0.5;
-};
 
 // Throws InputError when points are missing (names them), repeated, out of range, all in one place or not finite, or
 // when the mesh is (no polygons, an index out of range, a position that is not finite). Deterministic. A head of 26 719

@@ -6,22 +6,24 @@
 
 namespace volto::rig {
 
-EdgeGraph buildEdgeGraph(const Mesh& mesh, std::span<const std::uint32_t> same_as) {
+EdgeGraph buildEdgeGraph(const Mesh& mesh, const Mesh& polygons, std::span<const std::uint32_t> same_as) {
   std::vector<std::uint64_t> edges;
-  edges.reserve(mesh.corner_vertices.size() * 4);
+  edges.reserve(polygons.corner_vertices.size() * 4);
   const auto connect = [&edges](std::uint64_t a, std::uint64_t b) {
     if (a == b) return;
     edges.push_back(a << 32 | b);
     edges.push_back(b << 32 | a);
   };
-  for (std::size_t p = 0; p < mesh.polygonCount(); ++p) {
-    const std::uint32_t first = mesh.polygon_start[p];
-    const std::uint32_t corners = mesh.polygon_start[p + 1] - first;
-    const auto corner = [&](std::uint32_t c) { return same_as[mesh.corner_vertices[first + c % corners]]; };
+  for (std::size_t p = 0; p < polygons.polygonCount(); ++p) {
+    const std::uint32_t first = polygons.polygon_start[p];
+    const std::uint32_t corners = polygons.polygon_start[p + 1] - first;
+    const auto corner = [&](std::uint32_t c) { return same_as[polygons.corner_vertices[first + c % corners]]; };
     for (std::uint32_t c = 0; c < corners; ++c) connect(corner(c), corner(c + 1));
-    if (corners == 4) {
-      connect(corner(0), corner(2));
-      connect(corner(1), corner(3));
+    if (corners <= kMostCornersCutAllWays) {
+      for (std::uint32_t c = 0; c + 2 < corners; ++c)
+        for (std::uint32_t d = c + 2; d < corners; ++d) connect(corner(c), corner(d));
+    } else {
+      for (std::uint32_t c = 2; c + 1 < corners; ++c) connect(corner(0), corner(c));
     }
   }
   std::sort(edges.begin(), edges.end());

@@ -22,9 +22,11 @@ struct EdgeGraph {
   std::size_t vertexCount() const { return start.empty() ? 0 : start.size() - 1; }
 };
 
-// Polygon edges and the diagonals of quads, between the vertices that `same_as` says stand for others (rig/weld.h); the
-// rest has none.
-EdgeGraph buildEdgeGraph(const Mesh& mesh, std::span<const std::uint32_t> same_as);
+inline constexpr std::uint32_t kMostCornersCutAllWays = 8;
+
+// Edges and diagonals of `polygons` (its vertices are the mesh's; of polygons with more than eight corners only the
+// diagonals of a fan), between the vertices that `same_as` says stand for others (rig/weld.h); the rest has none.
+EdgeGraph buildEdgeGraph(const Mesh& mesh, const Mesh& polygons, std::span<const std::uint32_t> same_as);
 
 struct GeodesicSource {
   std::uint32_t vertex;

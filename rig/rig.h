@@ -11,6 +11,8 @@
 #include "rig/expression_table.h"
 #include "rig/fapu.h"
 #include "rig/mesh.h"
+#include "rig/refined_mask.h"
+#include "rig/rig_options.h"
 
 namespace volto::rig {
 
@@ -34,7 +36,7 @@ struct Association {
 
 // A separate component that moves as one piece, or not at all.
 struct RigidPart {
-  enum class Follows : std::uint8_t { head = 0, jaw = 1, left_eye = 2, right_eye = 3, skin = 4 };
+  using Follows = RigidPartFollows;
   std::string name;                        // "left eyeball", "upper teeth", ... or the material's name
   Follows follows = Follows::head;
   std::vector<std::uint32_t> vertices;
@@ -106,6 +108,7 @@ struct Rig {
   std::vector<Combination> combinations;
   std::vector<PartMotion> part_motions;
   Contacts contacts;
+  RefinedMask refined;                                            // empty unless subdivision was asked for
 };
 
 }  // namespace volto::rig

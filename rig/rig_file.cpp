@@ -9,6 +9,7 @@
 
 #include "rig/file_bytes.h"
 #include "rig/motion_file.h"
+#include "rig/rig_file_refined.h"
 #include "rig_file_generated.h"
 
 namespace volto::rig {
@@ -81,6 +82,8 @@ class Decoder {
     } catch (const std::invalid_argument& e) {
       fail(e.what());
     }
+    if (in_.refined() != nullptr)
+      rig_.refined = decodeRefinedMask(*in_.refined(), rig_.neutral.vertexCount(), [this](const auto& what) { fail(what); });
     return std::move(rig_);
   }
 
@@ -338,9 +341,11 @@ std::vector<std::byte> encodeRig(const Rig& rig) {
   }
   const auto shape_vector = builder.CreateVector(shapes);
   const auto motion = encodeMotion(builder, rig);
+  flatbuffers::Offset<file::RefinedMask> refined;
+  if (!rig.refined.empty()) refined = encodeRefinedMask(builder, rig.refined);
   file::FinishRigBuffer(builder, file::CreateRig(builder, name, mesh_file, mesh, feature_ids, feature_vertex,
                                                  feature_positions, mesh_from_head, fapu, triangle, kind, region_vector,
-                                                 row_start, point, weight, part_vector, shape_vector, motion));
+                                                 row_start, point, weight, part_vector, shape_vector, motion, refined));
 
   std::array<unsigned char, kHeaderBytes> header{};
   std::memcpy(header.data(), kMagic.data(), kMagic.size());

@@ -10,6 +10,7 @@
 #include <Eigen/Geometry>
 
 #include "rig/closest_point.h"
+#include "rig/errors.h"
 
 namespace volto::rig {
 namespace {
@@ -18,6 +19,9 @@ double smoothStep(double x) {
   x = std::clamp(x, 0.0, 1.0);
   return x * x * (3 - 2 * x);
 }
+
+using OperatorRow = std::array<double, kFeaturePointCount>;
+using Binding = PlacedParts::Binding;
 
 std::size_t pointIndex(std::string_view id) { return featurePointIndex(id).value(); }
 
@@ -71,6 +75,13 @@ std::optional<Sphere> fitSphere(const VertexPositions& at, const std::vector<std
   return s;
 }
 
+std::size_t firstTriangleAt(std::size_t point) {
+  const auto triangles = maskTriangles();
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+    if (std::find(triangles[t].begin(), triangles[t].end(), point) != triangles[t].end()) return t;
+  return 0;
+}
+
 class PartPlacer {
  public:
   PartPlacer(const Mesh& mesh, const Skin& skin, const std::vector<bool>& is_skin, const HeadPlace& place,
@@ -88,16 +99,17 @@ class PartPlacer {
     mouth_width_ = std::max((point("8.3") - point("8.4")).norm(), 0.1);
   }
 
-  std::vector<RigidPart> place() {
+  PlacedParts place(const std::vector<PartEdit>& edits) {
     components_ = components();
     done_.assign(components_.size(), false);
+    for (const PartEdit& edit : edits) placeAsTold(edit);
     if (components_.empty()) return {};
     placeEye(RigidPart::Follows::left_eye, "left", (point("3.7") + point("3.11")) / 2);
     placeEye(RigidPart::Follows::right_eye, "right", (point("3.8") + point("3.12")) / 2);
     placeMouth();
     for (std::size_t c = 0; c < components_.size(); ++c)
       if (!done_[c]) placeOnSkin(components_[c]);
-    return std::move(parts_);
+    return {std::move(parts_), std::move(bindings_)};
   }
 
  private:
@@ -150,12 +162,28 @@ class PartPlacer {
 
   void setRow(std::uint32_t v, const OperatorRow& row, std::int16_t triangle) {
     association_.kind[v] = AssociationKind::rigid_part;
-    bool moves = false;
-    for (const double w : row) moves |= w != 0;
-    if (!moves) return;
+    for (std::size_t p = 0; p < kFeaturePointCount; ++p)
+      if (row[p] != 0) row_.add(p, row[p]);
+    setBuiltRow(v, triangle);
+  }
+
+  void setBuiltRow(std::uint32_t v, std::int16_t triangle) {
+    if (!row_.moves()) {
+      row_.clear();
+      return;
+    }
     association_.triangle[v] = triangle;
-    rows_.row_of_vertex[v] = static_cast<std::int32_t>(rows_.rows.size());
-    rows_.rows.push_back(row);
+    rows_.set(v, row_);
+  }
+
+  // The row of a vertex that follows the skin as `binding` says.
+  void bind(Binding binding, std::int16_t triangle) {
+    association_.kind[binding.vertex] = AssociationKind::rigid_part;
+    for (const auto& [of, weight] : binding.of)
+      if (rows_.moves(of)) row_.addRow(rows_.rows, static_cast<std::size_t>(rows_.row_of_vertex[of]), weight);
+    row_.dropSmall();
+    setBuiltRow(binding.vertex, triangle);
+    bindings_.push_back(std::move(binding));
   }
 
   void addPart(const std::string& name, RigidPart::Follows follows, const Component& part,
@@ -167,6 +195,34 @@ class PartPlacer {
     out.centre = meshFrame(centre);
     for (const std::uint32_t v : part.vertices) association_.kind[v] = AssociationKind::rigid_part;
     parts_.push_back(std::move(out));
+  }
+
+  // --- what a person said
+
+  void placeAsTold(const PartEdit& edit) {
+    const std::string vertex = "part at vertex " + std::to_string(edit.vertex);
+    if (edit.vertex >= mesh_.vertexCount()) throw InputError(vertex + ": the mesh has " + std::to_string(mesh_.vertexCount()));
+    if (is_skin_[skin_.component[edit.vertex]]) throw InputError(vertex + " is the skin itself, no separate part");
+    for (std::size_t c = 0; c < components_.size(); ++c) {
+      const Component& part = components_[c];
+      if (!std::binary_search(part.vertices.begin(), part.vertices.end(), edit.vertex)) continue;
+      if (done_[c]) throw InputError(vertex + " is in a part that was told what to follow already");
+      done_[c] = true;
+      const std::size_t before = parts_.size();
+      if (edit.follows == RigidPartFollows::skin) {
+        placeOnSkin(part);
+      } else {
+        const bool eye = edit.follows == RigidPartFollows::left_eye || edit.follows == RigidPartFollows::right_eye;
+        const auto ball = eye ? fitSphere(at_, part.vertices) : std::nullopt;
+        addPart(edit.name, edit.follows, part, ball ? ball->centre : part.centre);
+        const auto jaw_triangle = static_cast<std::int16_t>(firstTriangleAt(pointIndex("2.10")));
+        if (edit.follows == RigidPartFollows::jaw)
+          for (const std::uint32_t v : part.vertices) setRow(v, jawRow(at_.row(v).transpose()), jaw_triangle);
+      }
+      if (!edit.name.empty() && parts_.size() > before) parts_.back().name = edit.name;
+      return;
+    }
+    throw InputError(vertex + " is in no polygon");
   }
 
   // --- eyes
@@ -270,7 +326,7 @@ class PartPlacer {
     std::vector<std::uint32_t> upper_teeth, lower_teeth;
     std::vector<std::size_t> joined;
     const auto jaw_triangle =
-        static_cast<std::int16_t>(regionsOfInfluence().triangles_of_point[pointIndex("2.10")].front());
+        static_cast<std::int16_t>(firstTriangleAt(pointIndex("2.10")));
     for (const std::size_t c : inside) {
       const Component& part = components_[c];
       done_[c] = true;
@@ -336,7 +392,7 @@ class PartPlacer {
 
   struct Root {
     Eigen::Vector3d at;
-    OperatorRow row;
+    std::vector<std::pair<std::uint32_t, double>> of;
     std::int16_t triangle;
   };
 
@@ -385,9 +441,9 @@ class PartPlacer {
       nearest[i] = surface->find(at_.row(part.vertices[i]).transpose(), kReach);
       if (nearest[i].triangle >= 0) closest = std::min(closest, nearest[i].distance);
     }
-    const auto rowAt = [&](const SurfacePoint& on_skin, OperatorRow& row, std::int16_t& triangle) {
+    const auto cornersAt = [&](const SurfacePoint& on_skin, double share, std::int16_t& triangle) {
       const auto& corners = surface->triangle(on_skin.triangle);
-      row.fill(0.0);
+      std::vector<std::pair<std::uint32_t, double>> of;
       triangle = -1;
       double most = -1;
       for (std::size_t k = 0; k < 3; ++k) {
@@ -395,58 +451,70 @@ class PartPlacer {
           most = on_skin.barycentric[k];
           triangle = association_.triangle[corners[k]];
         }
-        if (const OperatorRow* of_vertex = rows_.find(corners[k]))
-          for (std::size_t p = 0; p < kFeaturePointCount; ++p) row[p] += on_skin.barycentric[k] * (*of_vertex)[p];
+        if (on_skin.barycentric[k] > 0) of.emplace_back(corners[k], share * on_skin.barycentric[k]);
       }
+      return of;
     };
-    if (small && closest < 0.1) return placeByRoots(part, nearest, closest, rowAt);
+    if (small && closest < 0.1) return placeByRoots(part, nearest, closest, cornersAt);
 
     bool moves = false;
     for (std::size_t i = 0; i < part.vertices.size(); ++i) {
       if (nearest[i].triangle < 0) continue;
       const double share = 1 - smoothStep((nearest[i].distance - 0.02) / (kReach - 0.02));
-      OperatorRow row;
       std::int16_t triangle = -1;
-      rowAt(nearest[i], row, triangle);
-      for (double& w : row) w *= share;
-      dropSmallWeights(row);
-      setRow(part.vertices[i], row, triangle);
+      auto of = cornersAt(nearest[i], share, triangle);
+      bind({part.vertices[i], std::move(of)}, triangle);
       moves |= rows_.row_of_vertex[part.vertices[i]] >= 0;
     }
     addPart("part " + std::to_string(parts_.size() + 1), moves ? RigidPart::Follows::skin : RigidPart::Follows::head,
             part, part.centre);
   }
 
-  template <class RowAt>
+  template <class CornersAt>
   void placeByRoots(const Component& part, const std::vector<SurfacePoint>& nearest, double closest,
-                    const RowAt& rowAt) {
+                    const CornersAt& cornersAt) {
     addPart("part " + std::to_string(parts_.size() + 1), RigidPart::Follows::skin, part, part.centre);
     std::vector<Root> roots;
     for (std::size_t i = 0; i < part.vertices.size(); ++i)
       if (nearest[i].triangle >= 0 && nearest[i].distance < closest + 0.015) {
-        Root root{at_.row(part.vertices[i]), {}, -1};
-        rowAt(nearest[i], root.row, root.triangle);
-        roots.push_back(std::move(root));
+        std::int16_t triangle = -1;
+        auto of = cornersAt(nearest[i], 1.0, triangle);
+        roots.push_back({at_.row(part.vertices[i]), std::move(of), triangle});
       }
-    for (std::size_t i = 0; i < part.vertices.size(); ++i) {
-      const Eigen::Vector3d p = at_.row(part.vertices[i]);
-      OperatorRow row{};
-      double total = 0, nearest_root = std::numeric_limits<double>::infinity();
+    std::vector<double> share(roots.size());
+    for (const std::uint32_t v : part.vertices) {
+      double total = 0, largest = 0;
       std::int16_t triangle = -1;
-      for (const Root& root : roots) {
-        const double distance2 = (root.at - p).squaredNorm();
-        const double share = 1 / std::pow(distance2 + 1e-6, 2);
-        total += share;
-        for (std::size_t q = 0; q < kFeaturePointCount; ++q) row[q] += share * root.row[q];
-        if (distance2 < nearest_root) {
-          nearest_root = distance2;
-          triangle = root.triangle;
+      for (std::size_t r = 0; r < roots.size(); ++r) {
+        share[r] = 1 / std::pow((roots[r].at - at_.row(v).transpose()).squaredNorm() + 1e-6, 2);
+        total += share[r];
+        if (share[r] > largest) {
+          largest = share[r];
+          triangle = roots[r].triangle;
         }
       }
-      for (double& w : row) w /= total;
-      dropSmallWeights(row);
-      setRow(part.vertices[i], row, triangle);
+      Binding binding{v, {}};
+      for (std::size_t r = 0; r < roots.size(); ++r)
+        for (const auto& [of, weight] : roots[r].of) binding.of.emplace_back(of, share[r] / total * weight);
+      bind(compact(std::move(binding)), triangle);
     }
+  }
+
+  // One entry per vertex, without those that say next to nothing; the sum stays.
+  static Binding compact(Binding binding) {
+    std::sort(binding.of.begin(), binding.of.end());
+    std::vector<std::pair<std::uint32_t, double>> merged;
+    double before = 0, after = 0;
+    for (const auto& [of, weight] : binding.of) {
+      if (merged.empty() || merged.back().first != of) merged.emplace_back(of, 0.0);
+      merged.back().second += weight;
+      before += weight;
+    }
+    std::erase_if(merged, [](const auto& entry) { return entry.second < 1e-4; });
+    for (const auto& [of, weight] : merged) after += weight;
+    if (after > 0)
+      for (auto& [of, weight] : merged) weight *= before / after;
+    return {binding.vertex, std::move(merged)};
   }
 
   const Mesh& mesh_;
@@ -463,13 +531,15 @@ class PartPlacer {
   std::vector<Component> components_;
   std::vector<bool> done_;
   std::vector<RigidPart> parts_;
+  std::vector<Binding> bindings_;
+  RowBuilder row_{kFeaturePointCount};
 };
 
 }  // namespace
 
-std::vector<RigidPart> placeParts(const Mesh& mesh, const Skin& skin, const std::vector<bool>& is_skin,
-                                  const HeadPlace& place, SkinAssociation& association, SkinRows& rows) {
-  return PartPlacer(mesh, skin, is_skin, place, association, rows).place();
+PlacedParts placeParts(const Mesh& mesh, const Skin& skin, const std::vector<bool>& is_skin, const HeadPlace& place,
+                       const std::vector<PartEdit>& edits, SkinAssociation& association, SkinRows& rows) {
+  return PartPlacer(mesh, skin, is_skin, place, association, rows).place(edits);
 }
 
 }  // namespace volto::rig

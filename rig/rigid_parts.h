@@ -2,6 +2,7 @@
 // shape they have; a material's name helps where the artist gave one.
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "rig/association.h"
@@ -23,7 +24,17 @@ struct HeadPlace {
 // - small things on the skin (lashes, brows, the wet edge of the lids) move with the skin at their root, as a whole;
 // - everything else follows the skin it lies on, less and less with distance, and not at all from a third of the eye
 // separation on. Fills rows, and association.kind and .triangle of those vertices.
-std::vector<RigidPart> placeParts(const Mesh& mesh, const Skin& skin, const std::vector<bool>& is_skin,
-                                  const HeadPlace& place, SkinAssociation& association, SkinRows& rows);
+struct PlacedParts {
+  std::vector<RigidPart> parts;
+  // Vertices that follow the skin: displacement = sum of weight times that of a vertex of the skin.
+  struct Binding {
+    std::uint32_t vertex;
+    std::vector<std::pair<std::uint32_t, double>> of;
+  };
+  std::vector<Binding> bindings;
+};
+// What `edits` say about a part goes before what is found. Throws InputError when one names a vertex of the skin itself.
+PlacedParts placeParts(const Mesh& mesh, const Skin& skin, const std::vector<bool>& is_skin, const HeadPlace& place,
+                       const std::vector<PartEdit>& edits, SkinAssociation& association, SkinRows& rows);
 
 }  // namespace volto::rig

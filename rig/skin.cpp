@@ -39,7 +39,7 @@ class LaplaceAssembly {
   void addEdge(std::uint32_t a, std::uint32_t b, double weight) {
     const std::size_t ab = edgeIndex(skin_.graph, a, b), ba = edgeIndex(skin_.graph, b, a);
     if (ab >= skin_.laplacian.size() || ba >= skin_.laplacian.size())
-      return;  // an inner edge of a polygon with many corners
+      return;
     skin_.laplacian[ab] += weight;
     skin_.laplacian[ba] += weight;
   }
@@ -49,22 +49,26 @@ class LaplaceAssembly {
 
 }  // namespace
 
-Skin prepareSkin(const Mesh& mesh, std::vector<std::uint32_t> same_as) {
+Skin prepareSkin(const Mesh& mesh, const Mesh& polygons, std::vector<std::uint32_t> same_as) {
   Skin skin;
   skin.same_as = std::move(same_as);
-  skin.graph = buildEdgeGraph(mesh, skin.same_as);
+  skin.graph = buildEdgeGraph(mesh, polygons, skin.same_as);
   const std::size_t vertices = mesh.vertexCount();
   skin.normals = VertexPositions::Zero(mesh.positions.rows(), 3);
   skin.area.assign(vertices, 0.0);
   skin.laplacian.assign(skin.graph.neighbour.size(), 0.0);
 
   LaplaceAssembly assembly(mesh, skin);
-  for (std::size_t p = 0; p < mesh.polygonCount(); ++p) {
-    const std::uint32_t first = mesh.polygon_start[p];
-    const std::uint32_t corners = mesh.polygon_start[p + 1] - first;
-    const auto corner = [&](std::uint32_t c) { return skin.same_as[mesh.corner_vertices[first + c % corners]]; };
+  for (std::size_t p = 0; p < polygons.polygonCount(); ++p) {
+    const std::uint32_t first = polygons.polygon_start[p];
+    const std::uint32_t corners = polygons.polygon_start[p + 1] - first;
+    const auto corner = [&](std::uint32_t c) { return skin.same_as[polygons.corner_vertices[first + c % corners]]; };
     if (corners == 4) {
       for (std::uint32_t c = 0; c < 4; ++c) assembly.addTriangle(corner(c), corner(c + 1), corner(c + 2), 0.5);
+    } else if (corners <= kMostCornersCutAllWays) {
+      for (std::uint32_t apex = 0; apex < corners; ++apex)
+        for (std::uint32_t c = apex + 2; c < apex + corners; ++c)
+          assembly.addTriangle(corner(apex), corner(c - 1), corner(c), 1.0 / corners);
     } else {
       for (std::uint32_t c = 2; c < corners; ++c) assembly.addTriangle(corner(0), corner(c - 1), corner(c), 1.0);
     }

@@ -2,15 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
-
-#include <Eigen/SparseCholesky>
-#include <Eigen/SparseCore>
 
 #include "rig/multiquadric.h"
+#include "rig/parallel.h"
 
 namespace volto::rig {
 namespace {
+
+constexpr Eigen::Index kPanel = 42;  // columns that are solved together
+constexpr float kNegligible = 1e-5F;
 
 double smoothStep(double x) {
   x = std::clamp(x, 0.0, 1.0);
@@ -20,217 +20,263 @@ double smoothStep(double x) {
 // Step 1.
 class BlendedMultiquadrics {
  public:
-  explicit BlendedMultiquadrics(const FeaturePointPositions& points) : regions_(regionsOfInfluence()) {
-    for (std::size_t t = 0; t < kMaskTriangleCount; ++t) {
-      rbf_[t] = Multiquadric(points, regions_.points[t]);
+  BlendedMultiquadrics(const MaskGeometry& mask, const RegionEdits& edits)
+      : mask_(mask), regions_(regionsOfInfluence(mask, edits)), rbf_(kMaskTriangleCount), side_(kMaskTriangleCount) {
+    parallelFor(kMaskTriangleCount, [&](std::size_t t) {
+      const auto stiffness = edits.stiffness.find(static_cast<std::uint8_t>(t));
+      rbf_[t] = Multiquadric(mask.points, regions_.points[t], stiffness == edits.stiffness.end() ? 1 : stiffness->second);
       side_[t] = slitSideOfTriangle(t);
-    }
+    });
   }
 
-  OperatorRow row(std::size_t triangle, const std::array<double, 3>& barycentric, const Eigen::Vector3d& at) const {
+  void addRow(std::size_t triangle, const std::array<double, 3>& barycentric, const Eigen::Vector3d& at,
+              RowBuilder& row, Eigen::RowVectorXd& weights) const {
     std::array<double, kMaskTriangleCount> share{};
     double total = 0;
+    const SlitSide side = mask_.triangle_side[triangle];
     for (std::size_t i = 0; i < 3; ++i) {
-      const auto& around = regions_.triangles_of_point[maskTriangles()[triangle][i]];
+      const auto& around = regions_.triangles_of_point[mask_.triangles[triangle][i]];
       std::size_t allowed = 0;
-      for (const std::uint8_t t : around) allowed += opposite(side_[t], side_[triangle]) ? 0 : 1;
+      for (const std::uint8_t t : around) allowed += opposite(side_[t], side) ? 0 : 1;
       for (const std::uint8_t t : around)
-        if (!opposite(side_[t], side_[triangle])) share[t] += barycentric[i] / static_cast<double>(allowed);
+        if (!opposite(side_[t], side)) share[t] += barycentric[i] / static_cast<double>(allowed);
       total += barycentric[i];
     }
-    OperatorRow row{};
-    for (std::size_t t = 0; t < kMaskTriangleCount; ++t)
-      if (share[t] > 0) rbf_[t].addWeights(at, share[t] / total, row);
-    return row;
+    for (std::size_t t = 0; t < kMaskTriangleCount; ++t) {
+      if (!(share[t] > 0)) continue;
+      rbf_[t].weightsAt(at, weights);
+      const auto points = rbf_[t].points();
+      for (std::size_t j = 0; j < points.size(); ++j)
+        row.add(points[j], share[t] / total * weights[static_cast<Eigen::Index>(j)]);
+    }
   }
 
  private:
+  const MaskGeometry& mask_;
   RegionsOfInfluence regions_;
-  std::array<Multiquadric, kMaskTriangleCount> rbf_;
-  std::array<SlitSide, kMaskTriangleCount> side_{};
+  std::vector<Multiquadric> rbf_;
+  std::vector<SlitSide> side_;
 };
 
 // Mean length of the mask's edges at each point.
-std::array<double, kFeaturePointCount> maskEdgeLength(const FeaturePointPositions& points) {
-  std::array<double, kFeaturePointCount> sum{}, count{};
-  for (const MaskTriangle& t : maskTriangles())
+std::vector<double> maskEdgeLength(const MaskGeometry& mask) {
+  std::vector<double> sum(mask.pointCount()), count(mask.pointCount());
+  for (const MaskGeometry::Triangle& t : mask.triangles)
     for (std::size_t i = 0; i < 3; ++i) {
-      const std::uint8_t a = t[i], b = t[(i + 1) % 3];
-      const double length = (points.row(a) - points.row(b)).norm();
-      for (const std::uint8_t p : {a, b}) {
+      const std::uint16_t a = t[i], b = t[(i + 1) % 3];
+      const double length = (mask.points.row(a) - mask.points.row(b)).norm();
+      for (const std::uint16_t p : {a, b}) {
         sum[p] += length;
         count[p] += 1;
       }
     }
-  for (std::size_t p = 0; p < kFeaturePointCount; ++p) sum[p] /= std::max(count[p], 1.0);
+  for (std::size_t p = 0; p < sum.size(); ++p) sum[p] /= std::max(count[p], 1.0);
   return sum;
-}
-
-// Step 2. Unknowns are the rows of the vertices within the fade; lengths are in eye separations.
-class Fairing {
- public:
-  Fairing(const Skin& skin, const SkinAssociation& association, double eye_separation)
-      : skin_(skin), association_(association), es2_(eye_separation * eye_separation) {}
-
-  void solve(SkinRows& out, const std::vector<double>& data_weight, const SkinPoints& on_skin) const {
-    using Sparse = Eigen::SparseMatrix<double>;
-    const auto unknowns = static_cast<Eigen::Index>(out.rows.size());
-    std::vector<Eigen::Triplet<double>> entries;
-    Eigen::MatrixXd right = Eigen::MatrixXd::Zero(unknowns, static_cast<Eigen::Index>(kFeaturePointCount));
-
-    // Sum over vertices v of |(L x)_v|^2 / area_v. A neighbour beyond the fade counts with zero rows.
-    std::vector<std::pair<std::int32_t, double>> stencil;
-    for (std::uint32_t v = 0; v < skin_.same_as.size(); ++v) {
-      if (!skin_.stands(v) || !touches(out, v)) continue;
-      stencil.clear();
-      double diagonal = 0;
-      for (std::uint32_t e = skin_.graph.start[v]; e < skin_.graph.start[v + 1]; ++e) {
-        diagonal -= skin_.laplacian[e];
-        if (const std::int32_t u = out.row_of_vertex[skin_.graph.neighbour[e]]; u >= 0)
-          stencil.emplace_back(u, skin_.laplacian[e]);
-      }
-      if (out.row_of_vertex[v] >= 0) stencil.emplace_back(out.row_of_vertex[v], diagonal);
-      const double scale = 1 / areaOf(v);
-      for (const auto& [a, wa] : stencil)
-        for (const auto& [b, wb] : stencil)
-          if (a >= b) entries.emplace_back(a, b, scale * wa * wb);
-    }
-    for (std::uint32_t v = 0; v < skin_.same_as.size(); ++v) {
-      const std::int32_t row = out.row_of_vertex[v];
-      if (row < 0 || !skin_.stands(v)) continue;
-      // A trace of weight everywhere keeps a piece of skin without any point solvable.
-      const double weight = areaOf(v) * (data_weight[v] + 1e-9);
-      entries.emplace_back(row, row, weight);
-      for (std::size_t p = 0; p < kFeaturePointCount; ++p)
-        right(row, static_cast<Eigen::Index>(p)) += weight * out.rows[static_cast<std::size_t>(row)][p];
-    }
-    for (std::size_t p = 0; p < kFeaturePointCount; ++p) addPoint(out, p, on_skin[p], entries, right);
-
-    Sparse system(unknowns, unknowns);
-    system.setFromTriplets(entries.begin(), entries.end());
-    entries = {};
-    const Eigen::SimplicialLDLT<Sparse, Eigen::Lower> solver(system);
-    if (solver.info() != Eigen::Success) throw std::runtime_error("rigging: the skin's equations cannot be solved");
-    const Eigen::MatrixXd solution = solver.solve(right);
-    for (Eigen::Index row = 0; row < unknowns; ++row)
-      for (std::size_t p = 0; p < kFeaturePointCount; ++p)
-        out.rows[static_cast<std::size_t>(row)][p] = solution(row, static_cast<Eigen::Index>(p));
-  }
-
- private:
-  double areaOf(std::uint32_t v) const { return std::max(skin_.area[v] / es2_, 1e-9); }
-
-  bool touches(const SkinRows& out, std::uint32_t v) const {
-    if (out.row_of_vertex[v] >= 0) return true;
-    for (std::uint32_t e = skin_.graph.start[v]; e < skin_.graph.start[v + 1]; ++e)
-      if (out.row_of_vertex[skin_.graph.neighbour[e]] >= 0) return true;
-    return false;
-  }
-
-  // Holds the skin at a feature point to that point, by a weight far above all others; the rows of points that are
-  // vertices are set exactly afterwards.
-  void addPoint(const SkinRows& out, std::size_t p, const SkinPoint& point,
-                std::vector<Eigen::Triplet<double>>& entries, Eigen::MatrixXd& right) const {
-    std::vector<std::pair<std::int32_t, double>> shares;
-    for (std::size_t i = 0; i < point.around.size(); ++i)
-      if (const std::int32_t row = out.row_of_vertex[point.around[i].vertex]; row >= 0)
-        shares.emplace_back(row, point.weight[i]);
-    if (shares.empty()) return;
-    const double weight = 1e5 / areaOf(point.around.front().vertex);
-    for (const auto& [a, wa] : shares) {
-      for (const auto& [b, wb] : shares)
-        if (a >= b) entries.emplace_back(a, b, weight * wa * wb);
-      right(a, static_cast<Eigen::Index>(p)) += weight * wa;
-    }
-  }
-
-  const Skin& skin_;
-  const SkinAssociation& association_;
-  double es2_;
-};
-
-// Step 3. A column of one side is led to zero towards the vertices of the opposite side: from the full weight where the
-// column's own point is as near as the opposite side, to nothing there.
-void separateSides(const Skin& skin, const SkinAssociation& association, SkinRows& out) {
-  constexpr std::array<SlitSide, 6> kSides = {SlitSide::upper_lip,       SlitSide::lower_lip,
-                                              SlitSide::left_upper_lid,  SlitSide::left_lower_lid,
-                                              SlitSide::right_upper_lid, SlitSide::right_lower_lid};
-  std::vector<double> sum_before(out.rows.size());
-  for (std::size_t r = 0; r < out.rows.size(); ++r)
-    for (const double w : out.rows[r]) sum_before[r] += w;
-  for (const SlitSide side : kSides) {
-    std::vector<GeodesicSource> others;
-    for (std::uint32_t v = 0; v < skin.same_as.size(); ++v)
-      if (skin.stands(v) && opposite(association.side[v], side)) others.push_back({v, 0.0F});
-    if (others.empty()) continue;
-    const std::vector<float> to_others = geodesicDistances(skin.graph, others).distance;
-    for (std::size_t p = 0; p < kFeaturePointCount; ++p) {
-      if (slitSide(p) != side) continue;
-      for (std::uint32_t v = 0; v < skin.same_as.size(); ++v) {
-        if (out.row_of_vertex[v] < 0 || !(to_others[v] < kUnreached)) continue;
-        const double own = association.point_distance(v, static_cast<Eigen::Index>(p));
-        const double share = own < kUnreached ? to_others[v] / (to_others[v] + own + 1e-12) : 0.0;
-        out.rows[static_cast<std::size_t>(out.row_of_vertex[v])][p] *= smoothStep(2 * share);
-      }
-    }
-  }
-  for (std::size_t r = 0; r < out.rows.size(); ++r) {
-    double sum = 0;
-    for (const double w : out.rows[r]) sum += w;
-    if (sum > 0 && sum_before[r] > 0)
-      for (double& w : out.rows[r]) w *= std::min(sum_before[r] / sum, 3.0);
-  }
 }
 
 }  // namespace
 
-SkinRows skinRows(const Mesh& mesh, const Skin& skin, const SkinAssociation& association,
-                  const FeaturePointPositions& points, const SkinPoints& on_skin, double eye_separation,
-                  double blend_width) {
-  SkinRows out;
-  out.row_of_vertex.assign(mesh.vertexCount(), -1);
-  for (std::uint32_t v = 0; v < mesh.vertexCount(); ++v)
-    if (skin.stands(v) && association.kind[v] != AssociationKind::outside) {
-      out.row_of_vertex[v] = static_cast<std::int32_t>(out.rows.size());
-      out.rows.emplace_back();
-    }
-  const BlendedMultiquadrics multiquadrics(points);
-  const std::array<double, kFeaturePointCount> edge_length = maskEdgeLength(points);
-  std::vector<double> data_weight(mesh.vertexCount(), 0.0);
-  for (std::uint32_t v = 0; v < mesh.vertexCount(); ++v) {
-    if (out.row_of_vertex[v] < 0 || !association.on_mask[v]) continue;
-    const auto triangle = static_cast<std::size_t>(association.triangle[v]);
-    const auto& barycentric = association.barycentric[v];
-    out.rows[static_cast<std::size_t>(out.row_of_vertex[v])] =
-        multiquadrics.row(triangle, barycentric, mesh.positions.row(v).transpose());
-    double size = 0;
-    for (std::size_t i = 0; i < 3; ++i) size += barycentric[i] * edge_length[maskTriangles()[triangle][i]];
-    const double width = std::max(blend_width, 1e-3) * size / eye_separation;
-    // The two terms balance at this wavelength: (2 pi / width)^4.
-    data_weight[v] = std::pow(2 * 3.14159265358979 / width, 4);
-  }
-  Fairing(skin, association, eye_separation).solve(out, data_weight, on_skin);
-  separateSides(skin, association, out);
-  for (std::size_t p = 0; p < kFeaturePointCount; ++p)
-    if (on_skin[p].isVertex() && out.row_of_vertex[on_skin[p].around.front().vertex] >= 0) {
-      OperatorRow& row = out.rows[static_cast<std::size_t>(out.row_of_vertex[on_skin[p].around.front().vertex])];
-      row.fill(0.0);
-      row[p] = 1.0;
-    }
-  for (OperatorRow& row : out.rows) dropSmallWeights(row);
-  for (std::uint32_t v = 0; v < mesh.vertexCount(); ++v) out.row_of_vertex[v] = out.row_of_vertex[skin.same_as[v]];
+MaskOnSkin controlMaskOnSkin(const SkinProblem& problem, MaskGeometry geometry) {
+  MaskOnSkin out{std::move(geometry), problem.feature_points, {}, problem.association.barycentric};
+  out.triangle.assign(problem.mesh.vertexCount(), -1);
+  for (std::size_t v = 0; v < out.triangle.size(); ++v)
+    if (problem.association.on_mask[v]) out.triangle[v] = problem.association.triangle[v];
   return out;
 }
 
-void dropSmallWeights(OperatorRow& row) {
-  double before = 0, after = 0;
-  for (double& w : row) {
-    before += w;
-    w *= smoothStep((std::abs(w) - 1e-3) / 3e-3);
-    after += w;
+struct SkinInterpolation::State {
+  const SkinProblem& problem;
+  const MaskOnSkin& mask;
+  std::vector<std::int32_t> unknown;      // #V
+  std::vector<std::uint32_t> vertex;      // of each unknown
+  SparseRows blended;                     // step 1, per unknown; empty where there is no ray
+  std::unique_ptr<SkinEquations> equations;
+
+  // Distance along the skin from the side opposite to each, per vertex; empty where nothing is there.
+  std::array<std::vector<float>, 7> toOppositeSide() const;
+  double pointDistance(std::uint32_t v, std::size_t p) const;
+};
+
+SkinInterpolation::SkinInterpolation(const SkinProblem& problem, const MaskOnSkin& mask)
+    : state_(new State{problem, mask, {}, {}, {}, nullptr}) {
+  State& s = *state_;
+  const auto vertices = static_cast<std::uint32_t>(problem.mesh.vertexCount());
+  s.unknown.assign(vertices, -1);
+  for (std::uint32_t v = 0; v < vertices; ++v)
+    if (problem.skin.stands(v) && problem.association.kind[v] != AssociationKind::outside) {
+      s.unknown[v] = static_cast<std::int32_t>(s.vertex.size());
+      s.vertex.push_back(v);
+    }
+  const BlendedMultiquadrics multiquadrics(mask.geometry, problem.edits);
+  const std::vector<double> edge_length = maskEdgeLength(mask.geometry);
+  std::vector<double> data_weight(s.vertex.size(), 0.0);
+
+  // In chunks of vertices, put together in order.
+  constexpr std::size_t kChunk = 1024;
+  std::vector<SparseRows> chunks((s.vertex.size() + kChunk - 1) / kChunk);
+  parallelFor(chunks.size(), [&](std::size_t chunk) {
+    RowBuilder row(mask.geometry.pointCount());
+    Eigen::RowVectorXd weights;
+    for (std::size_t i = chunk * kChunk; i < std::min((chunk + 1) * kChunk, s.vertex.size()); ++i) {
+      const std::uint32_t v = s.vertex[i];
+      if (mask.triangle[v] >= 0) {
+        const auto triangle = static_cast<std::size_t>(mask.triangle[v]);
+        const auto& barycentric = mask.barycentric[v];
+        multiquadrics.addRow(triangle, barycentric, problem.mesh.positions.row(v).transpose(), row, weights);
+        double size = 0;
+        for (std::size_t k = 0; k < 3; ++k) size += barycentric[k] * edge_length[mask.geometry.triangles[triangle][k]];
+        const double width = std::max(problem.blend_width, 1e-3) * size / problem.eye_separation;
+        // The two terms balance at this wavelength: (2 pi / width)^4.
+        data_weight[i] = std::pow(2 * 3.14159265358979 / width, 4);
+      }
+      row.finish(chunks[chunk]);
+    }
+  });
+  for (SparseRows& chunk : chunks) {
+    for (std::size_t r = 0; r < chunk.size(); ++r) s.blended.start.push_back(s.blended.point.size() + chunk.start[r + 1]);
+    s.blended.point.insert(s.blended.point.end(), chunk.point.begin(), chunk.point.end());
+    s.blended.weight.insert(s.blended.weight.end(), chunk.weight.begin(), chunk.weight.end());
+    chunk = {};
   }
-  if (before > 0 && after > 0)
-    for (double& w : row) w *= std::min(before / after, 2.0);
+  s.equations =
+      std::make_unique<SkinEquations>(problem.skin, s.unknown, data_weight, mask.points, problem.eye_separation);
+}
+
+SkinInterpolation::~SkinInterpolation() = default;
+
+Columns SkinInterpolation::displace(const Columns& points) const {
+  const State& s = *state_;
+  const Eigen::Index panels = (points.cols() + kPanel - 1) / kPanel;
+  Columns out = Columns::Zero(static_cast<Eigen::Index>(s.unknown.size()), points.cols());
+  parallelFor(static_cast<std::size_t>(panels), [&](std::size_t panel) {
+    const Eigen::Index first = static_cast<Eigen::Index>(panel) * kPanel;
+    const Eigen::Index width = std::min(kPanel, points.cols() - first);
+    const Columns values = points.middleCols(first, width);
+    Columns x = Columns::Zero(static_cast<Eigen::Index>(s.vertex.size()), width);
+    for (std::size_t i = 0; i < s.vertex.size(); ++i)
+      for (std::size_t e = s.blended.start[i]; e < s.blended.start[i + 1]; ++e)
+        x.row(static_cast<Eigen::Index>(i)) += s.blended.weight[e] * values.row(s.blended.point[e]);
+    s.equations->solve(values, x);
+    for (std::size_t i = 0; i < s.vertex.size(); ++i)
+      out.block(s.vertex[i], first, 1, width) = x.row(static_cast<Eigen::Index>(i));
+    for (std::size_t p = 0; p < s.mask.points.size(); ++p)
+      if (s.mask.points[p].isVertex())
+        out.block(s.mask.points[p].around.front().vertex, first, 1, width) = values.row(static_cast<Eigen::Index>(p));
+  });
+  for (std::size_t v = 0; v < s.unknown.size(); ++v)
+    if (!s.problem.skin.stands(static_cast<std::uint32_t>(v)))
+      out.row(static_cast<Eigen::Index>(v)) = out.row(s.problem.skin.same_as[v]);
+  return out;
+}
+
+std::array<std::vector<float>, 7> SkinInterpolation::State::toOppositeSide() const {
+  std::array<std::vector<float>, 7> out;
+  parallelFor(6, [&](std::size_t k) {
+    const auto side = static_cast<SlitSide>(k + 1);
+    std::vector<GeodesicSource> others;
+    for (std::uint32_t v = 0; v < problem.skin.same_as.size(); ++v)
+      if (problem.skin.stands(v) && opposite(problem.association.side[v], side)) others.push_back({v, 0.0F});
+    if (!others.empty()) out[k + 1] = geodesicDistances(problem.skin.graph, others).distance;
+  });
+  return out;
+}
+
+// Along the skin for the feature points; through the air for those that were added, which lie between them.
+double SkinInterpolation::State::pointDistance(std::uint32_t v, std::size_t p) const {
+  if (p >= kFeaturePointCount)
+    return (problem.mesh.positions.row(v) - mask.geometry.points.row(static_cast<Eigen::Index>(p))).norm();
+  return std::min(problem.association.point_distance(v, static_cast<Eigen::Index>(p)), 2 * problem.association.reach);
+}
+
+SkinRows SkinInterpolation::rows() const {
+  const State& s = *state_;
+  const std::size_t unknowns = s.vertex.size(), points = s.mask.geometry.pointCount();
+  const std::array<std::vector<float>, 7> to_opposite = s.toOppositeSide();
+
+  struct Panel {
+    std::vector<std::size_t> start{0};
+    std::vector<std::uint16_t> point;
+    std::vector<float> weight;
+    std::vector<double> sum;  // of each row before step 3
+  };
+  std::vector<Panel> panels((points + kPanel - 1) / static_cast<std::size_t>(kPanel));
+  parallelFor(panels.size(), [&](std::size_t k) {
+    const std::size_t first = k * static_cast<std::size_t>(kPanel);
+    const std::size_t last = std::min(first + static_cast<std::size_t>(kPanel), points);
+    const auto width = static_cast<Eigen::Index>(last - first);
+    Columns values = Columns::Zero(static_cast<Eigen::Index>(points), width);
+    for (std::size_t p = first; p < last; ++p)
+      values(static_cast<Eigen::Index>(p), static_cast<Eigen::Index>(p - first)) = 1;
+    Columns x = Columns::Zero(static_cast<Eigen::Index>(unknowns), width);
+    for (std::size_t i = 0; i < unknowns; ++i)
+      for (std::size_t e = s.blended.start[i]; e < s.blended.start[i + 1]; ++e)
+        if (const std::size_t p = s.blended.point[e]; p >= first && p < last)
+          x(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(p - first)) = s.blended.weight[e];
+    s.equations->solve(values, x);
+
+    Panel& out = panels[k];
+    out.sum.reserve(unknowns);
+    for (std::size_t i = 0; i < unknowns; ++i) {
+      out.sum.push_back(x.row(static_cast<Eigen::Index>(i)).sum());
+      for (std::size_t p = first; p < last; ++p) {
+        double w = x(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(p - first));
+        if (!(std::abs(w) > kNegligible)) continue;
+        // Step 3: a column of one side is led to zero towards the vertices of the opposite side, from the full weight
+        // where the column's own point is as near as the opposite side, to nothing there.
+        const auto& others = to_opposite[static_cast<std::size_t>(s.mask.geometry.point_side[p])];
+        if (!others.empty() && others[s.vertex[i]] < kUnreached) {
+          const double other = others[s.vertex[i]];
+          w *= smoothStep(2 * other / (other + s.pointDistance(s.vertex[i], p) + 1e-12));
+        }
+        if (!(std::abs(w) > kNegligible)) continue;
+        out.point.push_back(static_cast<std::uint16_t>(p));
+        out.weight.push_back(static_cast<float>(w));
+      }
+      out.start.push_back(out.point.size());
+    }
+  });
+
+  // Points that are vertices move with themselves alone; where lips or lids share a vertex, it goes half way with each.
+  std::vector<std::int32_t> held_by(s.unknown.size(), -1);
+  std::vector<std::vector<std::uint16_t>> sharing;
+  for (std::size_t p = 0; p < points; ++p) {
+    if (!s.mask.points[p].isVertex()) continue;
+    std::int32_t& slot = held_by[s.mask.points[p].around.front().vertex];
+    if (slot < 0) {
+      slot = static_cast<std::int32_t>(sharing.size());
+      sharing.emplace_back();
+    }
+    sharing[static_cast<std::size_t>(slot)].push_back(static_cast<std::uint16_t>(p));
+  }
+
+  SkinRows out;
+  out.row_of_vertex.assign(s.unknown.size(), -1);
+  RowBuilder row(points);
+  for (std::size_t i = 0; i < unknowns; ++i) {
+    const std::uint32_t v = s.vertex[i];
+    if (held_by[v] >= 0) {
+      const auto& of = sharing[static_cast<std::size_t>(held_by[v])];
+      for (const std::uint16_t p : of) row.add(p, 1.0 / static_cast<double>(of.size()));
+    } else {
+      double before = 0;
+      for (const Panel& panel : panels) {
+        before += panel.sum[i];
+        for (std::size_t e = panel.start[i]; e < panel.start[i + 1]; ++e) row.add(panel.point[e], panel.weight[e]);
+      }
+      if (const double after = row.sum(); after > 0 && before > 0) row.scale(std::min(before / after, 3.0));
+      row.dropSmall();
+    }
+    out.set(v, row);
+  }
+  // A vertex on another polygon's edge stays on that edge, or the crack would show.
+  for (const TVertex& t : s.problem.t_vertices) {
+    if (s.unknown[t.vertex] < 0 || held_by[t.vertex] >= 0) continue;
+    for (const auto& [end, share] : {std::pair{t.a, 1 - t.share}, std::pair{t.b, t.share}})
+      if (out.moves(end)) row.addRow(out.rows, static_cast<std::size_t>(out.row_of_vertex[end]), share);
+    out.set(t.vertex, row);
+  }
+  for (std::uint32_t v = 0; v < s.unknown.size(); ++v) out.row_of_vertex[v] = out.row_of_vertex[s.problem.skin.same_as[v]];
+  return out;
 }
 
 }  // namespace volto::rig

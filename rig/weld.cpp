@@ -122,6 +122,10 @@ bool runsAlong(const Slit& slit, const Eigen::Vector3d& a, const Eigen::Vector3d
 
 }  // namespace
 
+bool runsAlongSlit(std::span<const Slit> slits, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::any_of(slits.begin(), slits.end(), [&](const Slit& slit) { return runsAlong(slit, a, b); });
+}
+
 std::vector<std::uint32_t> weldSeams(const Mesh& mesh, std::span<const Slit> slits) {
   const std::vector<DirectedEdge> boundary = boundaryEdges(mesh);
   std::vector<std::uint32_t> vertices;
@@ -148,7 +152,7 @@ std::vector<std::uint32_t> weldSeams(const Mesh& mesh, std::span<const Slit> sli
   for (std::size_t i = 1; i < placed.size(); ++i) {
     if (placed[i].key != placed[i - 1].key) continue;
     const Eigen::Vector3d a = mesh.positions.row(placed[i].edge.from), b = mesh.positions.row(placed[i].edge.to);
-    if (std::any_of(slits.begin(), slits.end(), [&](const Slit& slit) { return runsAlong(slit, a, b); })) continue;
+    if (runsAlongSlit(slits, a, b)) continue;
     welded.join(placed[i - 1].edge.from, placed[i].edge.from);
     welded.join(placed[i - 1].edge.to, placed[i].edge.to);
   }

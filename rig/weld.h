@@ -16,6 +16,9 @@ struct Slit {
   std::vector<Eigen::Vector3d> upper, lower;  // from one corner to the other, mesh frame
 };
 
+// Whether an edge runs along one of them, close to both of its chains and parallel to them.
+bool runsAlongSlit(std::span<const Slit> slits, const Eigen::Vector3d& a, const Eigen::Vector3d& b);
+
 // same_as[v]: the vertex (the smallest index) that stands for v. Vertices are the same when boundary edges of two
 // polygons run between the same two positions (within 1e-6 of the mesh's size) - except along a slit, where the edges
 // are close to both of its chains and parallel to them.

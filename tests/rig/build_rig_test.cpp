@@ -7,8 +7,8 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
-#include "rig/region_of_influence.h"
 #include "rig/rig_file.h"
+#include "rig/slit_side.h"
 #include "tests/rig/test_head.h"
 
 namespace volto::rig {

@@ -1,5 +1,5 @@
-// Which control points each triangle's RBF has: its own vertices and those of the triangles that share a vertex with
-// it, as far as the labels of lips and lids allow (Queiroz, section IV-A, Figures 3 and 5).
+// The sides of the slits in the face, from the labels of points and triangles: what keeps the regions of influence of
+// one lip or lid from reaching the other (Queiroz, section IV-A, Figure 5 b). The regions themselves: rig/mask_geometry.h.
 #pragma once
 
 #include <array>
@@ -29,12 +29,6 @@ SlitSide slitSideOfTriangle(std::size_t mask_triangle);
 // True for the two sides of the same slit.
 bool opposite(SlitSide a, SlitSide b);
 
-struct RegionsOfInfluence {
-  std::array<std::vector<std::uint8_t>, kMaskTriangleCount>
-      points;  // ascending; a triangle's own three are always there
-  std::array<std::vector<std::uint8_t>, kFeaturePointCount>
-      triangles_of_point;  // triangles that have the point as a vertex
-};
-RegionsOfInfluence regionsOfInfluence();
+SlitSide sideOf(FaceRegion region);
 
 }  // namespace volto::rig

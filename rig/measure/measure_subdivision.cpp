@@ -1,0 +1,156 @@
+// volto-measure-subdivision FOLDER POINTS.json [VERTICES]
+//
+// Self-transfer (Queiroz, Figure 20): the expressions of FOLDER/expressions/*.obj over FOLDER/neutral.obj, reproduced
+// from the displacements of the mask's points alone, at several subdivisions; beside it one global multiquadric and one
+// global thin-plate spline over the same points. Relative error over the first VERTICES vertices (all when left out):
+// the mean over the expressions of |made - truth| / |truth|.
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "rig/build_rig.h"
+#include "rig/measure/global_splines.h"
+#include "rig/mesh_io.h"
+
+namespace {
+
+using namespace volto::rig;
+
+std::string textOf(const std::filesystem::path& path) {
+  std::ostringstream text;
+  text << std::ifstream(path, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+double secondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+struct Examples {
+  std::vector<std::string> names;
+  std::vector<VertexPositions> displacements;
+};
+
+Examples readExamples(const std::filesystem::path& folder, const Mesh& neutral, Eigen::Index counted) {
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    if (entry.path().extension() == ".obj") files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  Examples out;
+  for (const auto& file : files) {
+    VertexPositions d = readMesh(file).positions - neutral.positions;
+    if (d.topRows(counted).norm() / std::sqrt(static_cast<double>(counted)) < 1e-3) continue;  // nothing moves there
+    out.names.push_back(file.stem().string());
+    out.displacements.push_back(std::move(d));
+  }
+  return out;
+}
+
+struct Line {
+  double mean = 0, worst = 0;
+  std::string worst_name;
+};
+
+template <class Make>
+Line measure(const Examples& examples, Eigen::Index counted, const Make& make) {
+  Line line;
+  for (std::size_t k = 0; k < examples.names.size(); ++k) {
+    const VertexPositions& truth = examples.displacements[k];
+    const double error = (make(truth).topRows(counted) - truth.topRows(counted)).norm() / truth.topRows(counted).norm();
+    line.mean += error / static_cast<double>(examples.names.size());
+    if (error > line.worst) {
+      line.worst = error;
+      line.worst_name = examples.names[k];
+    }
+  }
+  return line;
+}
+
+int run(int argc, char** argv) {
+  const std::filesystem::path folder = argv[1];
+  const Mesh neutral = readMesh(folder / "neutral.obj");
+  const FeaturePointChoices points = parseFeaturePoints(textOf(argv[2]), argv[2]);
+  const auto counted = argc > 3 ? static_cast<Eigen::Index>(std::atol(argv[3])) : neutral.positions.rows();
+  const Examples examples = readExamples(folder / "expressions", neutral, counted);
+  std::printf("%zu expressions, %td vertices counted of %zu\n", examples.names.size(), counted, neutral.vertexCount());
+  std::printf("%-16s %6s %9s %9s %-14s %8s %8s %8s\n", "subdivision", "points", "regions", "worst", "", "global", "thin",
+              "rigging");
+  std::printf("%-16s %6s %9s %9s %-14s %8s %8s %8s\n", "", "", "", "", "", "multiq.", "plate", "s");
+  const VertexPositions at = neutral.positions.topRows(counted);
+  const auto report = [&](const std::string& name, const Subdivision& subdivision) {
+    RigOptions options;
+    options.subdivision = subdivision;
+    if (subdivision.budget > 0) options.examples = examples.displacements;
+    const auto start = std::chrono::steady_clock::now();
+    const Rig rig = buildRig(neutral, points, options);
+    const double seconds = secondsSince(start);
+    VertexPositions mask_points = rig.feature_positions;
+    if (!rig.refined.empty()) mask_points = rig.refined.positions;
+    const auto taken = [&](const VertexPositions& truth) {
+      if (!rig.refined.empty()) return pointDisplacements(rig.refined, neutral.positions, truth);
+      VertexPositions d(static_cast<Eigen::Index>(volto::kFeaturePointCount), 3);
+      for (std::size_t p = 0; p < volto::kFeaturePointCount; ++p)
+        d.row(static_cast<Eigen::Index>(p)) = truth.row(rig.feature_vertex[p]);
+      return d;
+    };
+    const Line regions = measure(examples, counted, [&](const VertexPositions& truth) -> VertexPositions {
+      const VertexPositions d = taken(truth);
+      if (!rig.refined.empty()) return displaceVertices(rig.refined, d);
+      VertexPositions made = VertexPositions::Zero(truth.rows(), 3);
+      for (std::size_t v = 0; v < rig.deformation.vertexCount(); ++v)
+        for (std::uint32_t e = rig.deformation.row_start[v]; e < rig.deformation.row_start[v + 1]; ++e)
+          made.row(static_cast<Eigen::Index>(v)) += rig.deformation.weight[e] * d.row(rig.deformation.point[e]);
+      return made;
+    });
+    // All expressions side by side, so that the dense systems are factored once.
+    Eigen::MatrixXd all(mask_points.rows(), 3 * static_cast<Eigen::Index>(examples.names.size()));
+    for (std::size_t k = 0; k < examples.names.size(); ++k)
+      all.middleCols(3 * static_cast<Eigen::Index>(k), 3) = taken(examples.displacements[k]);
+    const auto measured = [&](const Eigen::MatrixXd& made) {
+      std::size_t k = 0;
+      return measure(examples, counted, [&](const VertexPositions&) -> VertexPositions {
+        return made.middleCols(3 * static_cast<Eigen::Index>(k++), 3);
+      });
+    };
+    const Line multiquadric = measured(globalMultiquadric(mask_points, all, at));
+    const Line plate = measured(globalThinPlate(mask_points, all, at));
+    std::printf("%-16s %6td %9.4f %9.4f %-14s %8.4f %8.4f %8.2f\n", name.c_str(), mask_points.rows(), regions.mean,
+                regions.worst, regions.worst_name.c_str(), multiquadric.mean, plate.mean, seconds);
+    std::fflush(stdout);
+    return static_cast<std::size_t>(mask_points.rows());
+  };
+  for (const int level : {0, 1, 2, 4}) {
+    Subdivision all;
+    all.levels = level;
+    const std::size_t count = report("all " + std::to_string(level), all);
+    if (level == 0 || level > 2) continue;
+    for (const std::size_t part : {2, 4}) {
+      Subdivision automatic;
+      automatic.budget = (count - volto::kFeaturePointCount) / part;
+      report("auto 1/" + std::to_string(part) + " of " + std::to_string(level), automatic);
+    }
+  }
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 3 || argc > 4) {
+    std::fputs("usage: volto-measure-subdivision FOLDER POINTS.json [VERTICES]\n", stderr);
+    return 2;
+  }
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "volto-measure-subdivision: %s\n", error.what());
+    return 65;
+  }
+}

@@ -1,0 +1,121 @@
+#include "rig/skin_equations.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
+
+namespace volto::rig {
+namespace {
+
+using Sparse = Eigen::SparseMatrix<double>;
+
+}  // namespace
+
+struct SkinEquations::State {
+  struct Held {
+    std::uint32_t point;
+    std::int32_t unknown;
+    double weight;
+  };
+  std::vector<double> data_scale;  // per unknown
+  std::vector<Held> held;
+  Sparse lower;  // of the factors, unit diagonal left out
+  Eigen::VectorXd diagonal;
+  Eigen::VectorXi order;  // row of the factors -> unknown
+};
+
+SkinEquations::SkinEquations(const Skin& skin, std::span<const std::int32_t> unknown,
+                             std::span<const double> data_weight, std::span<const SkinPoint> points,
+                             double eye_separation)
+    : state_(std::make_unique<State>()) {
+  const double es2 = eye_separation * eye_separation;
+  const auto areaOf = [&](std::uint32_t v) { return std::max(skin.area[v] / es2, 1e-9); };
+  const auto unknowns = static_cast<Eigen::Index>(data_weight.size());
+  const auto vertices = static_cast<std::uint32_t>(skin.same_as.size());
+
+  // Sum over vertices v of |(L x)_v|^2 / area_v = |B x|^2; a neighbour that is no unknown counts with zero.
+  std::vector<Eigen::Triplet<double>> entries;
+  Eigen::Index stencils = 0;
+  for (std::uint32_t v = 0; v < vertices; ++v) {
+    if (!skin.stands(v)) continue;
+    const std::size_t before = entries.size();
+    const double scale = 1 / std::sqrt(areaOf(v));
+    double own = 0;
+    for (std::uint32_t e = skin.graph.start[v]; e < skin.graph.start[v + 1]; ++e) {
+      own -= skin.laplacian[e];
+      if (const std::int32_t u = unknown[skin.graph.neighbour[e]]; u >= 0)
+        entries.emplace_back(stencils, u, scale * skin.laplacian[e]);
+    }
+    if (unknown[v] >= 0) entries.emplace_back(stencils, unknown[v], scale * own);
+    if (entries.size() > before) ++stencils;
+  }
+  Sparse bending(stencils, unknowns);
+  bending.setFromTriplets(entries.begin(), entries.end());
+  entries.clear();
+  Sparse system(unknowns, unknowns);
+  system.selfadjointView<Eigen::Lower>().rankUpdate(Sparse(bending.transpose()));
+  bending = Sparse();
+
+  state_->data_scale.assign(data_weight.size(), 0.0);
+  for (std::uint32_t v = 0; v < vertices; ++v) {
+    if (!skin.stands(v) || unknown[v] < 0) continue;
+    const auto row = static_cast<std::size_t>(unknown[v]);
+    // A trace of weight everywhere keeps a piece of skin without any point solvable.
+    state_->data_scale[row] = areaOf(v) * (data_weight[row] + 1e-9);
+    entries.emplace_back(unknown[v], unknown[v], state_->data_scale[row]);
+  }
+  // Points are held by a weight far above all others; the rows of points that are vertices are set exactly afterwards.
+  for (std::uint32_t p = 0; p < points.size(); ++p) {
+    const double weight = 1e5 / areaOf(points[p].around.front().vertex);
+    for (std::size_t i = 0; i < points[p].around.size(); ++i) {
+      const std::int32_t a = unknown[points[p].around[i].vertex];
+      if (a < 0) continue;
+      state_->held.push_back({p, a, weight * points[p].weight[i]});
+      for (std::size_t j = 0; j < points[p].around.size(); ++j)
+        if (const std::int32_t b = unknown[points[p].around[j].vertex]; b >= 0 && a >= b)
+          entries.emplace_back(a, b, weight * points[p].weight[i] * points[p].weight[j]);
+    }
+  }
+  Sparse more(unknowns, unknowns);
+  more.setFromTriplets(entries.begin(), entries.end());
+  entries = {};
+  system = Sparse(system.triangularView<Eigen::Lower>()) + more;
+
+  const Eigen::SimplicialLDLT<Sparse, Eigen::Lower> factors(system);
+  if (factors.info() != Eigen::Success) throw std::runtime_error("rigging: the skin's equations cannot be solved");
+  state_->lower = factors.matrixL().nestedExpression();
+  state_->diagonal = factors.vectorD();
+  state_->order.resize(unknowns);
+  for (Eigen::Index i = 0; i < unknowns; ++i) {
+    const Eigen::Index row = factors.permutationP().size() > 0 ? factors.permutationP().indices()[i] : i;
+    state_->order[row] = static_cast<int>(i);
+  }
+}
+
+SkinEquations::~SkinEquations() = default;
+SkinEquations::SkinEquations(SkinEquations&&) noexcept = default;
+SkinEquations& SkinEquations::operator=(SkinEquations&&) noexcept = default;
+
+// Forward and back over the factors once for all columns: a row of the right side is contiguous, and the factors, which
+// are large, come from memory once.
+void SkinEquations::solve(const Columns& values, Columns& data) const {
+  const State& s = *state_;
+  const Eigen::Index unknowns = data.rows();
+  for (Eigen::Index row = 0; row < unknowns; ++row) data.row(row) *= s.data_scale[static_cast<std::size_t>(row)];
+  for (const State::Held& h : s.held) data.row(h.unknown) += h.weight * values.row(h.point);
+  Columns x(unknowns, data.cols());
+  for (Eigen::Index i = 0; i < unknowns; ++i) x.row(i) = data.row(s.order[i]);
+  for (Eigen::Index j = 0; j < unknowns; ++j)
+    for (Sparse::InnerIterator it(s.lower, j); it; ++it)
+      if (it.row() > j) x.row(it.row()).noalias() -= it.value() * x.row(j);
+  for (Eigen::Index j = unknowns; j-- > 0;) {
+    x.row(j) /= s.diagonal[j];
+    for (Sparse::InnerIterator it(s.lower, j); it; ++it)
+      if (it.row() > j) x.row(j).noalias() -= it.value() * x.row(it.row());
+  }
+  for (Eigen::Index i = 0; i < unknowns; ++i) data.row(s.order[i]) = x.row(i);
+}
+
+}  // namespace volto::rig

@@ -1,0 +1,46 @@
+// The equations that make displacements of a skin fair: one sparse factorisation, then as many right sides as wanted.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "rig/geodesic.h"
+#include "rig/skin.h"
+
+namespace volto::rig {
+
+// A control point on the skin: one vertex, or the three of the triangle it lies in.
+struct SkinPoint {
+  std::vector<GeodesicSource> around;  // the vertices and how far they are
+  std::vector<double> weight;          // barycentric, sum 1
+  bool isVertex() const { return around.size() == 1; }
+};
+
+// One row per unknown, or per control point; one column per right side.
+using Columns = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+// x minimises  sum over vertices of |Laplacian x|^2 area + sum of area data_weight |x - data|^2  (lengths in eye separations), with x held
+// at the control points to their values and zero at all vertices that are no unknowns. Area and Laplacian make the
+// solution one of the surface, not of how densely it is meshed.
+class SkinEquations {
+ public:
+  // `unknown`: #V, index of each vertex that is an unknown, -1 for others. `data_weight`: per unknown. Factors once.
+  // Throws std::runtime_error when the skin's equations cannot be solved.
+  SkinEquations(const Skin& skin, std::span<const std::int32_t> unknown, std::span<const double> data_weight,
+                std::span<const SkinPoint> points, double eye_separation);
+  ~SkinEquations();
+  SkinEquations(SkinEquations&&) noexcept;
+  SkinEquations& operator=(SkinEquations&&) noexcept;
+
+  // `data`: #unknowns by C, replaced by the solution. `values`: #points by C. Thread-safe.
+  void solve(const Columns& values, Columns& data) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace volto::rig
