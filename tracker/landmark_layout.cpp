@@ -23,6 +23,17 @@ std::int16_t openSeeFaceFromIbug(int ibug) {
   return static_cast<std::int16_t>(ibug - 2);
 }
 
+// MediaPipe's face mesh has no outline and no points named as iBUG's: the nearest of its 468 skin points, after
+// PeizhiYan/Mediapipe_2_Dlib_Landmarks (mp2dlib.py); of two, the first. Lids, brows and lips agree well, the outline by
+// a few millimetres.
+constexpr std::array<std::int16_t, 68> kMediaPipeFromIbug = {
+    127, 234, 93,  132, 58,  136, 150, 176, 152, 400, 379, 365, 288, 361, 323, 454, 356,  // outline
+    70,  63,  105, 66,  107, 336, 296, 334, 293, 300,                                     // brows
+    168, 197, 5,   4,   75,  97,  2,   326, 305,                                          // nose
+    33,  160, 158, 133, 153, 144, 362, 385, 387, 263, 373, 380,                           // lids
+    61,  39,  37,  0,   267, 269, 291, 321, 314, 17,  84,  91,                            // lips
+    78,  82,  13,  312, 308, 317, 14,  87};
+
 LayoutTable makeTable(LandmarkLayout layout) {
   LayoutTable table;
   const auto points = rig::featurePoints();
@@ -33,6 +44,8 @@ LayoutTable makeTable(LandmarkLayout layout) {
     const int ibug = own ? points[i].ibug68[0] : -1;
     table.landmark[i] = static_cast<std::int16_t>(ibug);
     if (own && layout == LandmarkLayout::openseeface66) table.landmark[i] = openSeeFaceFromIbug(ibug);
+    if (own && layout == LandmarkLayout::mediapipe478)
+      table.landmark[i] = kMediaPipeFromIbug[static_cast<std::size_t>(ibug)];
     table.trust[i] = ibug >= 0 && ibug <= 16 ? kOutlineTrust : 1.0;
   }
   return table;
@@ -55,16 +68,17 @@ std::string_view layoutName(LandmarkLayout layout) {
 const LayoutTable& layoutTable(LandmarkLayout layout) {
   static const LayoutTable ibug68 = makeTable(LandmarkLayout::ibug68);
   static const LayoutTable openseeface66 = makeTable(LandmarkLayout::openseeface66);
+  static const LayoutTable mediapipe478 = makeTable(LandmarkLayout::mediapipe478);
   switch (layout) {
     case LandmarkLayout::ibug68:
       return ibug68;
     case LandmarkLayout::openseeface66:
       return openseeface66;
     case LandmarkLayout::mediapipe478:
-      break;
+      return mediapipe478;
   }
-  throw std::invalid_argument("landmark layout " + std::string(layoutName(layout)) +
-                              " is not understood by the tracker; use ibug68 or openseeface66");
+  throw std::invalid_argument("landmark layout " + std::to_string(static_cast<int>(layout)) +
+                              " is not understood by the tracker; use ibug68, openseeface66 or mediapipe478");
 }
 
 }  // namespace volto::tracker

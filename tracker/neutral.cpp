@@ -6,6 +6,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "tracker/detector_noise.h"
 #include "tracker/face_model.h"
 #include "tracker/frame_fit.h"
 #include "tracker/neutral_estimator.h"
@@ -54,8 +55,8 @@ std::vector<Face> readFaces(std::span<const LandmarkFrame> frames, std::size_t m
 }  // namespace
 
 NeutralFace neutralFromRest(std::span<const LandmarkFrame> rest, const TrackerOptions& options) {
-  const Settings settings;
-  const MeasuredPoints points = measuredPoints(layoutTable(layoutOf(rest)));
+  const Settings settings = settingsFor(options);
+  const MeasuredPoints points = measuredPoints(layoutTable(layoutOf(rest)), options);
   const ShapePrior shape(points, settings);
   const ExpressionBasis basis(points, rig::ExpressionTable::standard());
   Observer observer(points, shape.mean(), {options.use_3d, options.focal_length_px});
@@ -102,13 +103,13 @@ NeutralFace neutralFromRest(std::span<const LandmarkFrame> rest, const TrackerOp
 
 NeutralFace neutralFromTake(std::span<const LandmarkFrame> take, const TrackerOptions& options,
                             const rig::ExpressionTable& table) {
-  return neutralFromTake(take, options, table, Settings{}, ExpressionPrior::standard());
+  return neutralFromTake(take, options, table, settingsFor(options), ExpressionPrior::standard());
 }
 
 NeutralFace neutralFromTake(std::span<const LandmarkFrame> take, const TrackerOptions& options,
                             const rig::ExpressionTable& table, const Settings& settings,
                             const ExpressionPrior& expression) {
-  const MeasuredPoints points = measuredPoints(layoutTable(layoutOf(take)));
+  const MeasuredPoints points = measuredPoints(layoutTable(layoutOf(take)), options);
   const ShapePrior shape(points, settings);
   const ExpressionBasis basis(points, table);
   Observer observer(points, shape.mean(), {options.use_3d, options.focal_length_px});

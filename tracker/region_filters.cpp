@@ -18,35 +18,48 @@ constexpr OneEuroConstants kLidPoints{3.0, 0.2};
 constexpr OneEuroConstants kMouthPoints{2.5, 0.15};
 constexpr OneEuroConstants kOtherPoints{1.0, 0.05};
 
-OneEuroConstants constantsOf(std::string_view shape) {
-  if (shape.starts_with("eye")) return kLids;
-  if (shape.starts_with("brow")) return kBrows;
-  if (shape.starts_with("mouth") || shape.starts_with("jaw") || shape.starts_with("tongue")) return kMouth;
-  return kElsewhere;
+constexpr std::array<OneEuroConstants, 4> kShapeConstants = {kLids, kBrows, kMouth, kElsewhere};
+constexpr std::array<OneEuroConstants, 4> kPointConstants = {kLidPoints, kOtherPoints, kMouthPoints, kOtherPoints};
+
+}  // namespace
+
+RegionFilters::Region RegionFilters::regionOf(std::string_view shape) {
+  if (shape.starts_with("eye")) return Region::lids;
+  if (shape.starts_with("brow")) return Region::brows;
+  if (shape.starts_with("mouth") || shape.starts_with("jaw") || shape.starts_with("tongue")) return Region::mouth;
+  return Region::cheeks;
 }
 
-OneEuroConstants constantsOf(rig::FaceRegion region) {
+RegionFilters::Region RegionFilters::regionOf(rig::FaceRegion region) {
   switch (region) {
     case rig::FaceRegion::left_upper_lid:
     case rig::FaceRegion::left_lower_lid:
     case rig::FaceRegion::right_upper_lid:
     case rig::FaceRegion::right_lower_lid:
-      return kLidPoints;
+      return Region::lids;
     case rig::FaceRegion::upper_lip:
     case rig::FaceRegion::lower_lip:
     case rig::FaceRegion::chin:
-      return kMouthPoints;
+      return Region::mouth;
+    case rig::FaceRegion::forehead:
+    case rig::FaceRegion::left_brow:
+    case rig::FaceRegion::right_brow:
+      return Region::brows;
     default:
-      return kOtherPoints;
+      return Region::cheeks;
   }
 }
 
-}  // namespace
-
 RegionFilters::RegionFilters() {
-  for (std::size_t k = 0; k < kArkitBlendshapeCount; ++k) shape_constants_[k] = constantsOf(kArkitBlendshapeNames[k]);
+  for (std::size_t k = 0; k < kArkitBlendshapeCount; ++k) {
+    shape_region_[k] = regionOf(kArkitBlendshapeNames[k]);
+    shape_constants_[k] = kShapeConstants[static_cast<std::size_t>(shape_region_[k])];
+  }
   const auto points = rig::featurePoints();
-  for (std::size_t i = 0; i < kFeaturePointCount; ++i) point_constants_[i] = constantsOf(points[i].region);
+  for (std::size_t i = 0; i < kFeaturePointCount; ++i) {
+    point_region_[i] = regionOf(points[i].region);
+    point_constants_[i] = kPointConstants[static_cast<std::size_t>(point_region_[i])];
+  }
 }
 
 void RegionFilters::reset() {
@@ -54,15 +67,21 @@ void RegionFilters::reset() {
   for (OneEuro& f : points_) f.reset();
 }
 
-void RegionFilters::push(double dt_s, double smoothing, ArkitWeights& weights, rig::FeaturePointPositions& rest_mm) {
-  for (std::size_t k = 0; k < kArkitBlendshapeCount; ++k)
-    weights[k] =
-        std::clamp(static_cast<float>(shapes_[k].push(weights[k], dt_s, shape_constants_[k], smoothing)), 0.0F, 1.0F);
-  for (std::size_t i = 0; i < kFeaturePointCount; ++i)
+void RegionFilters::push(double dt_s, double smoothing, const RegionSmoothing& regions, ArkitWeights& weights,
+                         rig::FeaturePointPositions& rest_mm) {
+  const std::array<double, kRegions> strength = {smoothing * regions.lids, smoothing * regions.brows,
+                                                 smoothing * regions.mouth, smoothing * regions.cheeks};
+  for (std::size_t k = 0; k < kArkitBlendshapeCount; ++k) {
+    const double s = strength[static_cast<std::size_t>(shape_region_[k])];
+    weights[k] = std::clamp(static_cast<float>(shapes_[k].push(weights[k], dt_s, shape_constants_[k], s)), 0.0F, 1.0F);
+  }
+  for (std::size_t i = 0; i < kFeaturePointCount; ++i) {
+    const double s = strength[static_cast<std::size_t>(point_region_[i])];
     for (std::size_t c = 0; c < 3; ++c) {
       double& value = rest_mm(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(c));
-      value = points_[3 * i + c].push(value, dt_s, point_constants_[i], smoothing);
+      value = points_[3 * i + c].push(value, dt_s, point_constants_[i], s);
     }
+  }
 }
 
 }  // namespace volto::tracker

@@ -3,10 +3,13 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
+#include <string_view>
 
 #include "frames/mask_frame.h"
 #include "rig/feature_points.h"
 #include "tracker/one_euro.h"
+#include "tracker/tracker.h"
 
 namespace volto::tracker {
 
@@ -17,9 +20,17 @@ class RegionFilters {
 
   void reset();
   // In place. `rest_mm`: displacement of each point beyond what the weights explain, 84 by 3.
-  void push(double dt_s, double smoothing, ArkitWeights& weights, rig::FeaturePointPositions& rest_mm);
+  void push(double dt_s, double smoothing, const RegionSmoothing& regions, ArkitWeights& weights,
+            rig::FeaturePointPositions& rest_mm);
 
  private:
+  enum class Region : std::uint8_t { lids, brows, mouth, cheeks };
+  static constexpr std::size_t kRegions = 4;
+  static Region regionOf(std::string_view shape);
+  static Region regionOf(rig::FaceRegion region);
+
+  std::array<Region, kArkitBlendshapeCount> shape_region_;
+  std::array<Region, kFeaturePointCount> point_region_;
   std::array<OneEuroConstants, kArkitBlendshapeCount> shape_constants_;
   std::array<OneEuroConstants, kFeaturePointCount> point_constants_;
   std::array<OneEuro, kArkitBlendshapeCount> shapes_;

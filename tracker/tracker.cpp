@@ -7,9 +7,13 @@
 #include <Eigen/Cholesky>
 
 #include "rig/fapu.h"
+#include "tracker/detector_noise.h"
 #include "tracker/face_model.h"
 #include "tracker/frame_fit.h"
+#include "tracker/gaze.h"
+#include "tracker/head_filter.h"
 #include "tracker/head_pose.h"
+#include "tracker/lid_range.h"
 #include "tracker/mean_face.h"
 #include "tracker/neutral_estimator.h"
 #include "tracker/neutral_face.h"
@@ -32,6 +36,13 @@ constexpr double kSettle_s = 1.0;        // points are followed beyond the table
 constexpr double kUnitChange = 0.01;     // expressions are scaled anew when a FAPU changed by more than this
 constexpr double kLargestResidual_mm = 6.0;
 
+// Of the subject's right (0) and left (1) eye.
+std::size_t eyeBlinkIndex(std::size_t eye) {
+  static const std::array<std::size_t, 2> index = {arkitBlendshapeIndex("eyeBlinkRight").value(),
+                                                   arkitBlendshapeIndex("eyeBlinkLeft").value()};
+  return index[eye];
+}
+
 }  // namespace
 
 struct Tracker::State {
@@ -44,7 +55,7 @@ struct Tracker::State {
   struct Parts {
     Parts(const State& state, LandmarkLayout l)
         : layout(l),
-          points(measuredPoints(layoutTable(l))),
+          points(measuredPoints(layoutTable(l), state.options)),
           shape(points, state.settings),
           basis(points, *state.table),
           observer(points, shape.mean(), {state.options.use_3d, state.options.focal_length_px}),
@@ -144,6 +155,9 @@ struct Tracker::State {
   ShapeVector weights = ShapeVector::Zero();
   WeightPrior prior;
   RegionFilters filters;
+  HeadFilter head_filter;
+  GazeTracker gaze;
+  std::array<LidCalibration, 2> lids;  // right, left
   rig::FeaturePointPositions rest_mm = rig::FeaturePointPositions::Zero();
 
   // Lost and found.
@@ -230,7 +244,13 @@ void Tracker::State::measure(const LandmarkFrame& in, double dt_s, MaskFrame& ou
   }
   for (std::size_t k = 0; k < kArkitBlendshapeCount; ++k)
     out.arkit_weights[k] = p.shows()[k] ? static_cast<float>(weights[static_cast<Eigen::Index>(k)]) : 0.0F;
-  filters.push(dt_s, options.smoothing, out.arkit_weights, rest_mm);
+  if (options.from_pixels) {
+    for (std::size_t eye = 0; eye < 2; ++eye) {
+      float& blink = out.arkit_weights[eyeBlinkIndex(eye)];
+      blink = lids[eye].push(blink, dt_s);
+    }
+  }
+  filters.push(dt_s, options.smoothing, options.regions, out.arkit_weights, rest_mm);
 
   out.state = TrackingState::tracking;
   const double fit_quality = 1 / (1 + std::pow(p.fit.rms_mm() / kPoorFit_mm, 2));
@@ -249,9 +269,12 @@ void Tracker::State::measure(const LandmarkFrame& in, double dt_s, MaskFrame& ou
           static_cast<float>(0.5 + 0.5 * p.points.trust[i] * p.seen.weight[i]);
   Eigen::Vector3d translation = p.observer.scale() * pose.translation;
   translation.tail<2>() = -translation.tail<2>();
-  setHeadPose(pose.rotation, translation, out.head);
-  out.gaze = {};
+  Eigen::Matrix3d rotation = pose.rotation;
+  head_filter.push(dt_s, options.smoothing * options.regions.head, rotation, translation);
+  setHeadPose(rotation, translation, out.head);
   out.arkit_observed = p.shows();
+  gaze.push(in, pose, p.observer.focalLength_px(), dt_s, options.smoothing * options.regions.gaze, out.gaze);
+  lookSideways(out.gaze, out.arkit_weights, out.arkit_observed);
 }
 
 namespace {
@@ -304,7 +327,7 @@ void Tracker::State::blendIn(double dt_s, MaskFrame& out) {
 }
 
 Tracker::Tracker(const TrackerOptions& options, const rig::ExpressionTable& table)
-    : Tracker(options, table, Settings{}, ExpressionPrior::standard()) {}
+    : Tracker(options, table, settingsFor(options), ExpressionPrior::standard()) {}
 Tracker::Tracker(const TrackerOptions& options, const rig::ExpressionTable& table, const Settings& settings,
                  const ExpressionPrior& expression)
     : state_(std::make_unique<State>(options, table, settings, expression)) {}
@@ -316,11 +339,22 @@ void Tracker::setNeutral(const NeutralFace& neutral) {
   deviationOf(neutral, state_->parts->shape, state_->parts->points);  // throws before anything changes
   state_->fixed = neutral;
   state_->fixNeutral(neutral);
+  for (std::size_t eye = 0; eye < 2; ++eye) state_->lids[eye].start(neutral.lids[eye]);
 }
 
 NeutralFace Tracker::neutral() const {
   const State& s = *state_;
-  return makeNeutralFace(s.parts->shape, s.parts->points, s.parts->target, s.parts->observer.scale());
+  NeutralFace face = makeNeutralFace(s.parts->shape, s.parts->points, s.parts->target, s.parts->observer.scale());
+  if (s.parts->estimator.hasResult()) {
+    for (std::size_t k = 0; k < kArkitBlendshapeCount; ++k) {
+      const auto i = static_cast<Eigen::Index>(k);
+      face.usual[k] = static_cast<float>(std::clamp(s.usual[i], 0.0, 1.0));
+      face.deviation[k] =
+          static_cast<float>(std::clamp(std::sqrt(std::max(s.parts->estimator.habits()(i, i), 0.0)), 0.0, 1.0));
+    }
+  }
+  for (std::size_t eye = 0; eye < 2; ++eye) face.lids[eye] = s.lids[eye].range();
+  return face;
 }
 
 void Tracker::push(const LandmarkFrame& in, MaskFrame& out) {
@@ -344,6 +378,8 @@ void Tracker::push(const LandmarkFrame& in, MaskFrame& out) {
   if (usable && s.track(dt_s)) {
     if (!was_tracking) {
       s.filters.reset();
+      s.head_filter.reset();
+      s.gaze.reset();
       if (s.ever_shown) {
         s.before_return = s.shown;
         s.back_s = 0;

@@ -15,6 +15,12 @@ namespace volto::tracker {
 struct Settings;        // tracker/settings.h
 class ExpressionPrior;  // tracker/expression_prior.h
 
+// What the detector makes of one of the actor's lids: the eyeBlink weight of an open and of a closed eye. Both 0: not
+// known.
+struct LidRange {
+  float open = 0, closed = 0;
+};
+
 // The actor's face at rest. 84 by 3, millimetres (a scale is assumed when the input is 2D only), head frame.
 struct NeutralFace {
   rig::FeaturePointPositions positions_mm;
@@ -23,14 +29,29 @@ struct NeutralFace {
   // not known.
   ArkitWeights usual{};
   ArkitWeights deviation{};
+  std::array<LidRange, 2> lids{};  // right, left
+};
+
+// Smoothing of one region relative to the others. 0: not at all; more = smoother and later.
+struct RegionSmoothing {
+  double lids = 1.0;
+  double brows = 1.0;
+  double mouth = 1.0;   // and jaw
+  double cheeks = 1.0;  // and nose
+  double head = 0.0;    // the pose; recordings of good landmarks need none
+  double gaze = 1.0;
 };
 
 struct TrackerOptions {
   bool use_3d = true;          // false: 2D points only, even where the input has 3D
   double focal_length_px = 0;  // 0: as the input says, else guessed from the image size
-  double smoothing = 1.0;      // 0: no filter; more = smoother and later. Scales the per-region filters.
+  double smoothing = 1.0;      // 0: no filter; more = smoother and later. Scales all regions.
+  RegionSmoothing regions;
   double hold_s = 0.2;         // a lost face: the last good expression is held so long ...
   double ease_s = 0.5;         // ... and then led back to neutral in so long
+  // The landmarks come from a detector that looked at pixels (tracker/detector_noise.h): what people usually do counts
+  // for more against its noise and bias, and the lids' range is learned from blinks (tracker/lid_range.h).
+  bool from_pixels = false;
 };
 
 // One face of one stream. One thread at a time; two trackers share nothing. The same frames give the same output to the

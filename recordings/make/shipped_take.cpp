@@ -113,13 +113,14 @@ void writeTake(const ShippedTake& take, const std::filesystem::path& path) {
     throw std::runtime_error(path.string() + ": " + result.problem);
 }
 
-std::string manifestEntry(const std::filesystem::path& folder, const std::string& file, const std::string& what) {
+constexpr const char* kMade = "made by recordings/make (volto-make-take); no recording of a person is behind it";
+
+std::string manifestEntry(const std::filesystem::path& folder, const std::string& file, const std::string& what,
+                          const std::string& whence) {
   const std::string bytes = readWhole(folder / file);
-  return "    {\n      \"file\": \"" + file + "\",\n      \"what\": \"" + what +
-         "\",\n      \"whence\": \"made by recordings/make (volto-make-take); no recording of a person is behind "
-         "it\",\n"
-         "      \"licence\": \"Apache-2.0\",\n      \"bytes\": " +
-         std::to_string(bytes.size()) + ",\n      \"sha256\": \"" + capture::sha256Hex(bytes) + "\"\n    }";
+  return "    {\n      \"file\": \"" + file + "\",\n      \"what\": \"" + what + "\",\n      \"whence\": \"" + whence +
+         "\",\n      \"licence\": \"Apache-2.0\",\n      \"bytes\": " + std::to_string(bytes.size()) +
+         ",\n      \"sha256\": \"" + capture::sha256Hex(bytes) + "\"\n    }";
 }
 
 }  // namespace
@@ -180,12 +181,21 @@ void writeShippedTake(const ShippedTake& take, const std::filesystem::path& fold
   std::string manifest = "{\n  \"made_from\": \"" + Person().digest() + "\",\n  \"files\": [\n";
   manifest += manifestEntry(folder, "volto_take.take",
                             "36 s at 60 frames a second: a face speaks, blinks, smiles, frowns and turns its head; 68 "
-                            "iBUG landmarks in pixels "
-                            "with camera noise") +
+                            "iBUG landmarks in pixels with camera noise",
+                            kMade) +
               ",\n";
-  manifest +=
-      manifestEntry(folder, "volto_take.truth.csv", "the ARKit weights and head angles behind it, one row per frame") +
-      "\n  ]\n}\n";
+  manifest += manifestEntry(folder, "volto_take.truth.csv",
+                            "the ARKit weights and head angles behind it, one row per frame", kMade);
+  // Measured, not made: it is there or not, and stays as it is.
+  if (std::filesystem::exists(folder / "talking.take")) {
+    manifest +=
+        ",\n" + manifestEntry(folder, "talking.take",
+                              "8 s at 25 frames a second: a person speaks to a camera, seen by YuNet and PFLD; 68 "
+                              "iBUG landmarks and pupils in pixels with a real detector's noise and bias; no truth",
+                              "numbers measured by volto run on the talking test clip of the SadTalker project "
+                              "(talking_512x512_25fps.mp4); no picture of it");
+  }
+  manifest += "\n  ]\n}\n";
   writeWhole(folder / "manifest.json", manifest);
 }
 

@@ -227,7 +227,7 @@ TEST(TrackerLayouts, SixtySixPointsTrackToo) {
 TEST(TrackerLayouts, AnUnknownLayoutIsRefusedByName) {
   Tracker tracker;
   LandmarkFrame frame;
-  frame.layout = LandmarkLayout::mediapipe478;
+  frame.layout = static_cast<LandmarkLayout>(9);
   MaskFrame mask;
   EXPECT_THROW(tracker.push(frame, mask), std::invalid_argument);
 }

@@ -10,6 +10,7 @@
 #include <CLI/CLI.hpp>
 
 #include "capture/errors.h"
+#include "capture/image_source.h"
 #include "protocol/errors.h"
 #include "rig/errors.h"
 #include "tools/cli/exit_status.h"
@@ -23,11 +24,16 @@ namespace {
 
 constexpr Verb kVerbs[] = {
     {"rig", "rig a mesh: from an OBJ and its feature points to a character", defineRig},
+    {"run", "put a live face on a character and publish it: a camera, a video, landmarks by UDP", defineRun},
     {"replay", "play a recorded performance on a character and publish it", defineReplay},
     {"record", "record what an endpoint publishes into a take", defineRecord},
-    {"bake", "play a performance on a character into OBJ, CSV or PNG files", defineBake},
+    {"bake", "play a performance on a character into OBJ, GLB, CSV or PNG files", defineBake},
+    {"export", "a character for other programs: GLB with morph targets, or OBJ files", defineExport},
     {"track", "turn a performance into blendshape weights, without a character", defineTrack},
     {"inspect", "say what a rig, take, mesh or CSV file holds and how healthy it is", defineInspect},
+    {"cameras", "list the cameras and what they can do; try one", defineCameras},
+    {"doctor", "say which models are there, which are missing and how to get them", defineDoctor},
+    {"evaluate", "compare a set of expression meshes with what it should be", defineEvaluate},
 };
 
 void printHelp() {
@@ -130,6 +136,8 @@ int runVerb(const Verb& verb, std::vector<std::string> arguments) {
     return printError(who, error.what(), kBadData);
   } catch (const capture::InputError& error) {
     return printError(who, error.what(), kBadData);
+  } catch (const capture::DeviceError& error) {
+    return printError(who, error.what(), kUnavailable);
   } catch (const protocol::SetupError& error) {
     return printError(who, error.what(), error.exitStatus());
   } catch (const std::system_error& error) {

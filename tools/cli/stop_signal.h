@@ -11,4 +11,9 @@ void installStopSignals();
 // returns EINTR.
 bool stopRequested();
 
+// SIGUSR1 asks a running verb to calibrate anew. Without this call it ends the process.
+void installCalibrateSignal();
+// True once per signal.
+bool calibrateRequested();
+
 }  // namespace volto::cli

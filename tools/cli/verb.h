@@ -21,11 +21,16 @@ struct Verb {
 };
 
 RunVerb defineRig(CLI::App& app);
+RunVerb defineRun(CLI::App& app);
 RunVerb defineReplay(CLI::App& app);
 RunVerb defineRecord(CLI::App& app);
 RunVerb defineBake(CLI::App& app);
+RunVerb defineExport(CLI::App& app);
 RunVerb defineTrack(CLI::App& app);
 RunVerb defineInspect(CLI::App& app);
+RunVerb defineCameras(CLI::App& app);
+RunVerb defineDoctor(CLI::App& app);
+RunVerb defineEvaluate(CLI::App& app);
 
 // In the order a person meets them.
 std::span<const Verb> verbs();

@@ -37,6 +37,9 @@ class Tracking {
   void push(const Performance& performance, std::size_t frame, MaskFrame& out);
   // Forgets what was seen: the next frame is the first.
   void restart();
+  // From now on this is the actor's face at rest; and what is known of it so far.
+  void setNeutral(const tracker::NeutralFace& neutral) { tracker_.setNeutral(neutral); }
+  tracker::NeutralFace neutral() const { return tracker_.neutral(); }
 
  private:
   tracker::Tracker makeTracker() const;
@@ -55,6 +58,8 @@ class FramePath {
   void push(const LandmarkFrame& in);
   void push(const Performance& performance, std::size_t frame);
   void restart();
+  void setNeutral(const tracker::NeutralFace& neutral) { tracking_.setNeutral(neutral); }
+  tracker::NeutralFace neutral() const { return tracking_.neutral(); }
 
   // Of the last push; valid until the next.
   MaskFrame& mask() { return mask_; }
