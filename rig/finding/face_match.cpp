@@ -66,6 +66,16 @@ FaceFrame bettered(const FaceFrame& frame, const FaceMatch& match, const Relief&
   return next;
 }
 
+void judge(FaceMatch& match, std::size_t level) {
+  const FaceTemplate& face = faceTemplate();
+  const std::vector<ReliefLikeness> parts =
+      compareReliefs(face.relief[level], match.relief, face.parts[level], match.flow, kComparedAt);
+  for (std::size_t i = 0; i < 4; ++i) match.parts[i] = parts[i].mean();
+  // Hair may hang over one eye.
+  const double eyes = 0.75 * std::max(match.parts[0], match.parts[1]) + 0.25 * std::min(match.parts[0], match.parts[1]);
+  match.likeness = (eyes + match.parts[2] + match.parts[3]) / 6 + std::min({eyes, match.parts[2], match.parts[3]}) / 2;
+}
+
 }  // namespace
 
 FaceMatch glanceAtFace(const NormalisedSurface& surface, const FaceFrame& frame) {
@@ -74,7 +84,7 @@ FaceMatch glanceAtFace(const NormalisedSurface& surface, const FaceFrame& frame)
   match.frame = frame;
   match.relief = renderRelief(surface, frame, kCoarsePixel);
   match.flow = registerReliefs(face.relief[0], match.relief, face.mask[0], kCoarseLevels);
-  match.likeness = compareReliefs(face.relief[0], match.relief, face.mask[0], match.flow, kComparedAt);
+  judge(match, 0);
   return match;
 }
 
@@ -82,31 +92,30 @@ FaceMatch studyFace(const NormalisedSurface& surface, const FaceFrame& frame) {
   const FaceTemplate& face = faceTemplate();
   FaceMatch match = glanceAtFace(surface, frame);
   constexpr int kRounds = 3;
-  for (int round = 0; round < kRounds; ++round) {
-    const FaceFrame next = bettered(match.frame, match, match.relief, face.mask[0]);
-    match = glanceAtFace(surface, next);
-  }
+  for (int round = 0; round < kRounds; ++round)
+    match = glanceAtFace(surface, bettered(match.frame, match, match.relief, face.mask[0]));
   const ReliefFlow coarse = match.flow;
   match.relief = renderRelief(surface, match.frame, kFinePixel);
   match.flow = registerReliefs(face.relief[1], match.relief, face.mask[1], kFineLevels, &coarse);
-  match.likeness = compareReliefs(face.relief[1], match.relief, face.mask[1], match.flow, kComparedAt);
+  judge(match, 1);
   return match;
 }
 
-double likenessAround(const FaceMatch& match, const Eigen::Vector2d& p, double radius) {
+std::vector<double> likenessAround(const FaceMatch& match, std::span<const Eigen::Vector2d> points, double radius) {
   const FaceTemplate& face = faceTemplate();
   const std::size_t level = match.relief.pixel < (kCoarsePixel + kFinePixel) / 2 ? 1 : 0;
-  Grid window(face.mask[level].width, face.mask[level].height);
-  for (int j = 0; j < window.height; ++j)
-    for (int i = 0; i < window.width; ++i) {
-      const double r = (Relief::positionOf(i, j, match.relief.pixel) - p).norm() / radius;
-      if (r < 2.5) window.at(i, j) = static_cast<float>(std::exp(-r * r));
-    }
-  const ReliefLikeness likeness = compareReliefs(face.relief[level], match.relief, window, match.flow, kComparedAt);
-  const Eigen::Vector2d q = match.flow.carry(p);
-  const Eigen::Vector2d at = Relief::pixelsOf(q.x(), q.y(), match.relief.pixel);
-  const double seen = match.relief.seen.sample(static_cast<float>(at.x()), static_cast<float>(at.y()));
-  return std::clamp(seen * (likeness.normals + likeness.curvature) / 2, 0.0, 1.0);
+  std::vector<Grid> windows;
+  for (const Eigen::Vector2d& p : points) windows.push_back(softWindow(match.relief, p, radius));
+  const std::vector<ReliefLikeness> likeness =
+      compareReliefs(face.relief[level], match.relief, windows, match.flow, kComparedAt);
+  std::vector<double> result;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector2d q = match.flow.carry(points[i]);
+    const Eigen::Vector2d at = Relief::pixelsOf(q.x(), q.y(), match.relief.pixel);
+    const double seen = match.relief.seen.sample(static_cast<float>(at.x()), static_cast<float>(at.y()));
+    result.push_back(std::clamp(seen * likeness[i].mean(), 0.0, 1.0));
+  }
+  return result;
 }
 
 }  // namespace volto::rig

@@ -39,6 +39,9 @@ FaceTemplate makeTemplate() {
   for (std::size_t k = 0; k < 2; ++k) {
     result.relief[k] = renderRelief(surface, frame, pixels[k]);
     result.mask[k] = faceMask(result.relief[k]);
+    constexpr double kParts[4][2] = {{0.5, 0}, {-0.5, 0}, {0, -0.6}, {0, -1.05}};
+    for (std::size_t part = 0; part < 4; ++part)
+      result.parts[k][part] = softWindow(result.relief[k], {kParts[part][0], kParts[part][1]}, 0.3);
   }
   // Farthest points first: any first part is spread over the whole, at twice the density on the face.
   std::vector<Eigen::Vector3d> points, normals;
@@ -57,6 +60,7 @@ FaceTemplate makeTemplate() {
   for (std::size_t k = 0; k < std::min(kCount, points.size()); ++k) {
     result.points.push_back(points[next]);
     result.normals.push_back(normals[next]);
+    result.on_face.push_back(onFace(points[next]));
     const Eigen::Vector3d last = points[next];
     double best = -1;
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -69,6 +73,16 @@ FaceTemplate makeTemplate() {
 }
 
 }  // namespace
+
+Grid softWindow(const Relief& relief, const Eigen::Vector2d& centre, double radius) {
+  Grid window(relief.depth.width, relief.depth.height);
+  for (int j = 0; j < window.height; ++j)
+    for (int i = 0; i < window.width; ++i) {
+      const double r = (Relief::positionOf(i, j, relief.pixel) - centre).norm() / radius;
+      if (r < 2.5) window.at(i, j) = static_cast<float>(std::exp(-r * r));
+    }
+  return window;
+}
 
 const FaceTemplate& faceTemplate() {
   static const FaceTemplate made = makeTemplate();

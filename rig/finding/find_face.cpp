@@ -8,16 +8,13 @@
 
 #include <Eigen/Geometry>
 
-#include "rig/finding/face_match.h"
-#include "rig/finding/pose_search.h"
+#include "rig/finding/face_search.h"
 #include "rig/finding/winding.h"
 
 namespace volto::rig {
 namespace {
 
 constexpr std::size_t kSamples = 8000;
-constexpr std::size_t kPlanes = 4;
-constexpr std::size_t kCandidates = 12;
 
 // Those that a face's relief shows well.
 constexpr std::string_view kLandmarks[] = {"3.7", "3.11", "3.8", "3.12", "12.13", "9.3", "9.15",
@@ -29,9 +26,8 @@ std::string number(double value, const char* format) {
   return text.data();
 }
 
-// A face's relief is more than 0.8 alike to the generic one's, a stylised one's about 0.6; what is no face stays below
-// 0.5 (tests/rig/finding_test.cpp).
-double confidenceOf(const FaceMatch& match) { return 1 / (1 + std::exp(-(match.mean() - 0.55) / 0.06)); }
+// Half sure at a likeness that nothing has been seen with: people's faces lie above, what is no face below.
+double confidenceOf(const FaceMatch& match) { return 1 / (1 + std::exp(-(match.likeness - 0.66) / 0.035)); }
 
 void checkMesh(const Mesh& mesh, const FindOptions& options) {
   if (mesh.polygonCount() == 0) throw InputError("looked for a face and found no polygons");
@@ -41,24 +37,29 @@ void checkMesh(const Mesh& mesh, const FindOptions& options) {
                      ": decimate it, or give landmarks");
 }
 
-bool sameFace(const FaceFrame& a, const FaceFrame& b) {
-  return (a.toMesh({0, -0.5, 0}) - b.toMesh({0, -0.5, 0})).norm() < 1.2 * std::max(a.size, b.size);
+// What lies outside the head that has been found, if that is much.
+std::vector<SurfaceSample> besides(const std::vector<SurfaceSample>& samples, const FaceFrame& frame) {
+  std::vector<SurfaceSample> rest;
+  for (const SurfaceSample& s : samples)
+    if (frame.toHead(s.position).norm() > 0 && (frame.toHead(s.position) - Eigen::Vector3d(0, -0.2, -1)).norm() > 2.6)
+      rest.push_back(s);
+  if (rest.size() < samples.size() / 6) rest.clear();
+  return rest;
 }
 
 std::vector<RoughLandmark> landmarksOf(const FaceMatch& match, const NormalisedSurface& surface, double confidence) {
   std::vector<RoughLandmark> landmarks;
+  std::vector<Eigen::Vector2d> generic;
   for (const std::string_view id : kLandmarks) {
     const std::size_t point = *featurePointIndex(id);
-    const Eigen::Vector3d generic = faceTemplate().landmarks.row(static_cast<Eigen::Index>(point));
-    const Eigen::Vector2d p = match.flow.carry(generic.head<2>());
+    generic.push_back(faceTemplate().landmarks.row(static_cast<Eigen::Index>(point)).head<2>());
+    const Eigen::Vector2d p = match.flow.carry(generic.back());
     const Eigen::Vector2d at = Relief::pixelsOf(p.x(), p.y(), match.relief.pixel);
     const double z = match.relief.depth.sample(static_cast<float>(at.x()), static_cast<float>(at.y()));
-    RoughLandmark landmark;
-    landmark.feature_point = point;
-    landmark.position = surface.centre + surface.size * match.frame.toMesh({p.x(), p.y(), z});
-    landmark.confidence = confidence * likenessAround(match, generic.head<2>(), 0.2);
-    landmarks.push_back(landmark);
+    landmarks.push_back({point, surface.centre + surface.size * match.frame.toMesh({p.x(), p.y(), z}), 0});
   }
+  const std::vector<double> likeness = likenessAround(match, generic, 0.2);
+  for (std::size_t i = 0; i < landmarks.size(); ++i) landmarks[i].confidence = confidence * likeness[i];
   return landmarks;
 }
 
@@ -67,81 +68,47 @@ std::vector<RoughLandmark> landmarksOf(const FaceMatch& match, const NormalisedS
 FoundFace findFace(const Mesh& mesh, const FindOptions& options) {
   checkMesh(mesh, options);
   const NormalisedSurface surface = normaliseSurface(mesh);
-  const std::vector<SurfaceSample> samples = sampleVisibleSurface(surface, kSamples);
+  std::vector<std::uint32_t> hidden;
+  const std::vector<SurfaceSample> samples = sampleVisibleSurface(surface, kSamples, &hidden);
   if (samples.size() < 100)
     throw InputError("looked for a face and found next to no surface that is seen from outside");
-  const std::vector<SymmetryPlane> planes = findSymmetryPlanes(samples, kPlanes);
-  const std::vector<PoseCandidate> poses = searchPoses(samples, planes, kCandidates);
-  if (poses.empty()) throw InputError("looked for a plane of symmetry with a head on it and found none");
-
-  std::vector<FaceMatch> matches;
-  std::vector<std::size_t> order;
-  for (const PoseCandidate& pose : poses) matches.push_back(glanceAtFace(surface, pose.frame));
-  for (std::size_t i = 0; i < matches.size(); ++i) order.push_back(i);
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return matches[a].mean() > matches[b].mean(); });
-
-  // The few best are studied: a candidate that lies a little off may be the better face.
-  FaceMatch best;
-  std::size_t best_pose = 0;
-  std::vector<FaceMatch> others;
-  constexpr std::size_t kStudied = 3;
-  for (std::size_t k = 0; k < std::min(kStudied, order.size()); ++k) {
-    FaceMatch match = studyFace(surface, poses[order[k]].frame);
-    if (k == 0 || match.mean() > best.mean()) {
-      if (k > 0) others.push_back(std::move(best));
-      best = std::move(match);
-      best_pose = order[k];
-    } else {
-      others.push_back(std::move(match));
-    }
-  }
-
-  // The plane of the face alone, whatever the rest of the mesh does.
-  double error = 0;
-  SymmetryPlane plane = planes[poses[best_pose].plane];
-  if (plane.normal.dot(best.frame.mesh_from_head.col(0)) < 0)
-    plane.normal = -plane.normal, plane.offset = -plane.offset;
-  plane = refineSymmetryPlane(samples, plane, best.frame.toMesh({0, -0.4, -0.5}), 1.8 * best.frame.size, &error);
-  FaceFrame frame = best.frame;
-  frame.mesh_from_head =
-      Eigen::Quaterniond::FromTwoVectors(frame.mesh_from_head.col(0), plane.normal) * frame.mesh_from_head;
-  frame.origin -= (plane.normal.dot(frame.origin) - plane.offset) * plane.normal;
-  const FaceMatch turned = studyFace(surface, frame);
-  if (turned.mean() > best.mean() - 0.02) best = turned;
+  const SearchResult search = searchFace(surface, samples, true);
+  const FaceMatch& best = search.best;
 
   FoundFace found;
-  found.confidence = confidenceOf(best);
-  if (found.confidence < options.min_confidence)
-    throw InputError("looked for a face: " + std::to_string(planes.size()) + " planes of symmetry (the best mirrors " +
-                     number(100 * planes.front().score, "%.0f") + " % of the surface) and " +
-                     std::to_string(poses.size()) +
-                     " ways to lie on them, and found no relief of eyes, nose and mouth (likeness to a face " +
-                     number(best.mean(), "%.2f") + " of 1, needed about 0.6); give landmarks if this is a head");
-  for (const FaceMatch& other : others)
-    if (!sameFace(other.frame, best.frame) && other.mean() > best.mean() - 0.12)
+  found.confidence = search.poses == 0 ? 0 : confidenceOf(best);
+  if (search.poses == 0 || found.confidence < options.min_confidence)
+    throw InputError("looked for a face on " + std::to_string(search.planes) +
+                     " planes of symmetry (the best mirrors " + number(100 * search.best_mirrored, "%.0f") +
+                     " % of the surface), " + std::to_string(search.poses) +
+                     " ways to lie on them, and found no eyes, nose and mouth (likeness " +
+                     number(std::max(0.0, best.likeness), "%.2f") + ", a face has " + number(kFaceLikeness, "%.1f") +
+                     " or more); if this is a head, give landmarks");
+  if (const std::vector<SurfaceSample> rest = besides(samples, best.frame); !rest.empty()) {
+    const SearchResult other = searchFace(surface, rest, false);
+    if (other.best.likeness > kFaceLikeness)
       throw InputError("looked for one face and found two, " +
-                       number((other.frame.origin - best.frame.origin).norm() * surface.size, "%.3g") +
-                       " apart; keep one head in the file");
+                       number((other.best.frame.origin - best.frame.origin).norm() / best.frame.size, "%.1f") +
+                       " eye separations apart; keep one head in the file");
+  }
 
   found.mesh_from_head = best.frame.mesh_from_head;
   found.origin = surface.centre + surface.size * best.frame.origin;
   found.eye_separation = surface.size * best.frame.size;
   found.symmetry_normal = found.mesh_from_head.col(0);
   found.symmetry_offset = found.symmetry_normal.dot(found.origin);
-  found.symmetry_error = error / best.frame.size;
+  found.symmetry_error = search.symmetry_error / best.frame.size;
   found.landmarks = landmarksOf(best, surface, found.confidence);
 
-  Winding winding = findReversedPolygons(mesh, samples, best.frame);
+  Winding winding = findReversedPolygons(mesh, samples, hidden, best.frame);
   found.inside_out = winding.face_reversed;
   found.reversed_polygons = std::move(winding.reversed);
-  if (!found.reversed_polygons.empty())
-    found.notes.push_back(
-        found.inside_out
-            ? "the mesh is inside out, or mirrored by a left-handed program: its polygons run clockwise"
-            : std::to_string(found.reversed_polygons.size()) + " polygons run clockwise seen from outside");
+  if (found.inside_out)
+    found.notes.push_back("the mesh is inside out, or mirrored by a left-handed program: its polygons run clockwise");
+  else if (!found.reversed_polygons.empty())
+    found.notes.push_back(std::to_string(found.reversed_polygons.size()) + " polygons run clockwise seen from outside");
   if (found.symmetry_error > 0.06) found.notes.push_back("left and right of the face differ much");
-  if (found.confidence < 0.7) found.notes.push_back("this may not be a face, or not a human one");
+  if (found.confidence < 0.75) found.notes.push_back("this may not be a face, or not a human one: check the points");
   return found;
 }
 

@@ -62,6 +62,8 @@ double align(const FoldedSurface& surface, FoldedPose& pose, std::size_t count, 
   const FaceTemplate& face = faceTemplate();
   count = std::min(count, face.points.size());
   double total = 0;
+  double face_total = 0;
+  std::size_t face_count = 0;
   double weights = 0;
   struct Pair {
     Eigen::Vector3d p, q;
@@ -73,6 +75,7 @@ double align(const FoldedSurface& surface, FoldedPose& pose, std::size_t count, 
   Eigen::Vector2d mean_q = Eigen::Vector2d::Zero();
   const double reach2 = reach * reach * pose.size * pose.size;
   for (std::size_t i = 0; i < count; ++i) {
+    if (face.on_face[i]) ++face_count;
     const Eigen::Vector3d p = pose(face.points[i]);
     const NearestPoint::Hit hit = (*surface.nearest)(p);
     double cosine = pose.turned(face.normals[i]).dot(surface.normals[hit.index]);
@@ -81,6 +84,7 @@ double align(const FoldedSurface& surface, FoldedPose& pose, std::size_t count, 
     const double r = hit.squared_distance / reach2;
     const double weight = cosine / ((1 + r) * (1 + r));
     total += weight;
+    if (face.on_face[i]) face_total += weight;
     if (!move || weight < 0.05) continue;
     const Eigen::Vector3d& q = surface.points[hit.index];
     Eigen::Vector3d source(face.points[i].x(), face.points[i].y(), pose.facing * face.points[i].z());
@@ -89,7 +93,9 @@ double align(const FoldedSurface& surface, FoldedPose& pose, std::size_t count, 
     mean_p += weight * source.tail<2>();
     mean_q += weight * q.tail<2>();
   }
-  pose.closeness = total / static_cast<double>(count);
+  // A mesh may be a face alone, without the skull: the face counts more.
+  pose.closeness = 0.4 * total / static_cast<double>(count) +
+                   0.6 * face_total / static_cast<double>(std::max<std::size_t>(face_count, 1));
   if (!move || pairs.size() < 8) return pose.closeness;
   mean_p /= weights;
   mean_q /= weights;

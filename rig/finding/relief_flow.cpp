@@ -117,30 +117,38 @@ ReliefFlow registerReliefs(const Relief& first, const Relief& second, const Grid
   return flow;
 }
 
-ReliefLikeness compareReliefs(const Relief& first, const Relief& second, const Grid& mask, const ReliefFlow& flow,
-                              double scale) {
-  const ReliefForm a = reliefForm(first, scale);
-  const ReliefForm b = reliefForm(second, scale);
+std::vector<ReliefLikeness> compareReliefs(const Relief& first, const Relief& second, std::span<const Grid> masks,
+                                           const ReliefFlow& flow, double scale) {
+  ReliefForm a = reliefForm(first, scale);
+  ReliefForm b = reliefForm(second, scale);
   const float large = static_cast<float>(5 * scale / first.pixel);
-  std::array<double, 3> dot{}, aa{}, bb{};
   for (std::size_t c = 0; c < 3; ++c) {
-    Grid p = a[c];
-    Grid q = warped(b[c], flow);
-    Grid p_large = p;
-    Grid q_large = q;
-    blur(p_large, large);
-    blur(q_large, large);
-    for (std::size_t k = 0; k < mask.value.size(); ++k) {
-      const double x = p.value[k] - p_large.value[k];
-      const double y = q.value[k] - q_large.value[k];
-      dot[c] += mask.value[k] * x * y;
-      aa[c] += mask.value[k] * x * x;
-      bb[c] += mask.value[k] * y * y;
+    b[c] = warped(b[c], flow);
+    for (Grid* grid : {&a[c], &b[c]}) {
+      Grid smooth = *grid;
+      blur(smooth, large);
+      for (std::size_t k = 0; k < smooth.value.size(); ++k) grid->value[k] -= smooth.value[k];
     }
   }
-  // A relief without form has no likeness: what is expected of a face at least is a quarter of the first one's form.
-  auto correlation = [](double d, double x, double y) { return d / std::sqrt(x * std::max(y, x / 16) + 1e-12); };
-  return {correlation(dot[0] + dot[1], aa[0] + aa[1], bb[0] + bb[1]), correlation(dot[2], aa[2], bb[2])};
+  std::vector<ReliefLikeness> result;
+  for (const Grid& mask : masks) {
+    std::array<double, 3> ab{}, aa{}, bb{};
+    for (std::size_t c = 0; c < 3; ++c)
+      for (std::size_t k = 0; k < mask.value.size(); ++k) {
+        const double x = a[c].value[k];
+        const double y = b[c].value[k];
+        const double weight = mask.value[k];
+        ab[c] += weight * x * y;
+        aa[c] += weight * x * x;
+        bb[c] += weight * y * y;
+      }
+    // What is nearly flat is like nothing: a quarter of the first one's form is asked for at least.
+    auto correlation = [](double xy, double xx, double yy) {
+      return xy / std::sqrt(xx * std::max(yy, xx / 16) + 1e-12);
+    };
+    result.push_back({correlation(ab[0] + ab[1], aa[0] + aa[1], bb[0] + bb[1]), correlation(ab[2], aa[2], bb[2])});
+  }
+  return result;
 }
 
 }  // namespace volto::rig

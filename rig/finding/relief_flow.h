@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <span>
+#include <vector>
 
 #include "rig/finding/relief.h"
 
@@ -20,6 +22,8 @@ struct ReliefFlow {
 struct ReliefLikeness {
   double normals = 0;
   double curvature = 0;
+
+  double mean() const { return (normals + curvature) / 2; }
 };
 
 struct FlowLevel {
@@ -34,7 +38,8 @@ struct FlowLevel {
 ReliefFlow registerReliefs(const Relief& first, const Relief& second, const Grid& mask,
                            std::span<const FlowLevel> levels, const ReliefFlow* start = nullptr);
 
-ReliefLikeness compareReliefs(const Relief& first, const Relief& second, const Grid& mask, const ReliefFlow& flow,
-                              double scale);
+// One likeness for each mask.
+std::vector<ReliefLikeness> compareReliefs(const Relief& first, const Relief& second, std::span<const Grid> masks,
+                                           const ReliefFlow& flow, double scale);
 
 }  // namespace volto::rig

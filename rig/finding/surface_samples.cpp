@@ -147,7 +147,8 @@ NormalisedSurface normaliseSurface(const Mesh& mesh) {
   return surface;
 }
 
-std::vector<SurfaceSample> sampleVisibleSurface(const NormalisedSurface& surface, std::size_t count) {
+std::vector<SurfaceSample> sampleVisibleSurface(const NormalisedSurface& surface, std::size_t count,
+                                                std::vector<std::uint32_t>* hidden) {
   std::vector<SurfaceSample> samples = sampleSurface(surface, count);
   std::vector<float> as_wound(samples.size());
   std::vector<float> reversed(samples.size());
@@ -165,7 +166,10 @@ std::vector<SurfaceSample> sampleVisibleSurface(const NormalisedSurface& surface
     sample.seen_reversed = std::min(1.0F, reversed[i] / (kDirections / 4.0F));
     const float more = std::max(sample.seen_as_wound, sample.seen_reversed);
     const float less = std::min(sample.seen_as_wound, sample.seen_reversed);
-    if (more < 0.08F) continue;
+    if (more < 0.08F) {
+      if (hidden != nullptr) hidden->push_back(sample.triangle);
+      continue;
+    }
     sample.two_sided = less > 0.35F * more;
     if (!sample.two_sided && sample.seen_reversed > sample.seen_as_wound) sample.normal = -sample.normal;
     visible.push_back(sample);

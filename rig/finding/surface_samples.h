@@ -36,7 +36,9 @@ struct SurfaceSample {
 };
 
 // About `count` samples, half of them spread by area, half by triangle (artists make triangles where detail is);
-// those that can be seen from outside, at least at a slant, are returned. The surface's own frame. Deterministic.
-std::vector<SurfaceSample> sampleVisibleSurface(const NormalisedSurface& surface, std::size_t count);
+// those that can be seen from outside, at least at a slant, are returned; the triangles of the others are appended to
+// `hidden` where asked for. The surface's own frame. Deterministic.
+std::vector<SurfaceSample> sampleVisibleSurface(const NormalisedSurface& surface, std::size_t count,
+                                                std::vector<std::uint32_t>* hidden = nullptr);
 
 }  // namespace volto::rig

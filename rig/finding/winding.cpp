@@ -71,7 +71,8 @@ Patches orientablePatches(const Mesh& mesh) {
 
 }  // namespace
 
-Winding findReversedPolygons(const Mesh& mesh, std::span<const SurfaceSample> samples, const FaceFrame& frame) {
+Winding findReversedPolygons(const Mesh& mesh, std::span<const SurfaceSample> samples,
+                             std::span<const std::uint32_t> hidden_triangles, const FaceFrame& frame) {
   const Patches patches = orientablePatches(mesh);
   // triangulate() makes its triangles in polygon order, two fewer than corners each.
   std::vector<std::uint32_t> polygon_of;
@@ -80,6 +81,8 @@ Winding findReversedPolygons(const Mesh& mesh, std::span<const SurfaceSample> sa
 
   std::vector<double> vote(patches.count);    // positive: the patch's first polygon runs the right way
   std::vector<double> voters(patches.count);  // by how much it could be
+  std::vector<double> sampled(patches.count);
+  for (const std::uint32_t t : hidden_triangles) sampled[patches.patch[polygon_of[t]]] += 1;
   double rest = 0;
   double face = 0;
   for (const SurfaceSample& sample : samples) {
@@ -94,6 +97,7 @@ Winding findReversedPolygons(const Mesh& mesh, std::span<const SurfaceSample> sa
       right = on_face ? frame.mesh_from_head.col(2).dot(sample.normal) : 0;
       weight = std::abs(right);
     }
+    sampled[patch] += 1;
     vote[patch] += patches.turned[polygon] ? -right : right;
     voters[patch] += weight;
     rest += right;
@@ -103,7 +107,8 @@ Winding findReversedPolygons(const Mesh& mesh, std::span<const SurfaceSample> sa
   winding.face_reversed = face < 0;
   for (std::uint32_t p = 0; p < mesh.polygonCount(); ++p) {
     const std::uint32_t patch = patches.patch[p];
-    const bool says = voters[patch] > 0.5 && std::abs(vote[patch]) > 0.2 * voters[patch];
+    // The little that is seen of a mouth's inside from below the neck says nothing about the mouth.
+    const bool says = voters[patch] > 0.25 * sampled[patch] && std::abs(vote[patch]) > 0.4 * voters[patch];
     const bool wrong = says ? (vote[patch] < 0) != patches.turned[p] : rest < 0;
     if (wrong) winding.reversed.push_back(p);
   }

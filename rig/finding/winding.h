@@ -17,7 +17,9 @@ struct Winding {
 
 // Patches of polygons that agree with each other along their edges are turned as a whole: outward is where a patch is
 // seen from, and on the face, in front. What says nothing of itself (hidden, or seen from both sides alike) follows the
-// rest. `samples`, `frame`: in the surface's frame. O(E log E).
-Winding findReversedPolygons(const Mesh& mesh, std::span<const SurfaceSample> samples, const FaceFrame& frame);
+// rest. `samples`, `hidden_triangles` (one for each sample that is not seen), `frame`: as of sampleVisibleSurface().
+// O(E log E).
+Winding findReversedPolygons(const Mesh& mesh, std::span<const SurfaceSample> samples,
+                             std::span<const std::uint32_t> hidden_triangles, const FaceFrame& frame);
 
 }  // namespace volto::rig
