@@ -347,7 +347,7 @@ class CorrectionMaker {
       push[v] = std::min(push[v], 0.25F * es_);
     }
     // Spread to neighbours: never less than needed, falling off over some edges.
-    for (int round = 0; round < 8; ++round) {
+    for (int round = 0; round < 16; ++round) {
       std::vector<float> next = push;
       for (const std::uint32_t v : touched) {
         const std::uint32_t s = skin_.same_as[v];

@@ -59,12 +59,10 @@ PoseLab::PoseLab(const Rig& rig, const Skin& skin)
     in_contact_.insert(in_contact_.end(), ball.vertex.begin(), ball.vertex.end());
   for (const SlitContact& slit : rig.contacts.slits)
     in_contact_.insert(in_contact_.end(), slit.vertex.begin(), slit.vertex.end());
-  slit_of_sample_.assign(neutral_.size(), -1);
+  slit_of_.assign(neutral_.size(), -1);
   for (std::size_t k = 0; k < rig.contacts.slits.size(); ++k)
-    for (const auto* side : {&rig.contacts.slits[k].upper, &rig.contacts.slits[k].lower})
-      for (const SlitContact::Sample& sample : *side)
-        for (const std::uint32_t v : {sample.first, sample.second})
-          slit_of_sample_[skin_.same_as[v]] = static_cast<std::int32_t>(k);
+    for (const std::uint32_t v : rig.contacts.slits[k].vertex)
+      slit_of_[skin_.same_as[v]] = static_cast<std::int32_t>(k);
   std::sort(in_contact_.begin(), in_contact_.end());
   in_contact_.erase(std::unique(in_contact_.begin(), in_contact_.end()), in_contact_.end());
 }
@@ -114,14 +112,14 @@ bool PoseLab::unfold(DenseDisplacement& extra, std::span<const std::uint32_t> he
   std::vector<std::uint32_t> region, copies, seeds;
   std::vector<std::uint8_t> in_region(neutral_.size(), 0), is_held(neutral_.size(), 0);
   for (const std::uint32_t v : held) is_held[skin_.same_as[v]] = 1;
-  // Where a margin is relaxed, the push of its contact would be gone for all that it pushed: it becomes part of the
-  // correction instead.
+  // Where lips or lids are relaxed, the push of their contact becomes part of the correction: it would be made again on
+  // top of itself.
   std::vector<std::uint8_t> kept(rig_.contacts.slits.size(), 0), to_keep(kept);
   const auto addToRegion = [&](std::uint32_t v) {
     if (in_region[v] != 0 || !free_[v]) return;
     in_region[v] = 1;
     region.push_back(v);
-    if (slit_of_sample_[v] >= 0) to_keep[static_cast<std::size_t>(slit_of_sample_[v])] = 1;
+    if (slit_of_[v] >= 0) to_keep[static_cast<std::size_t>(slit_of_[v])] = 1;
     for (std::uint32_t i = triangles_of_start_[v]; i < triangles_of_start_[v + 1]; ++i) suspect(triangles_of_[i]);
   };
   std::vector<Eigen::Vector3f> moved(neutral_.size(), Eigen::Vector3f::Zero()), next;
@@ -131,10 +129,11 @@ bool PoseLab::unfold(DenseDisplacement& extra, std::span<const std::uint32_t> he
       if (uprightness(t) < kFoldCosine)
         for (const std::uint32_t v : triangles_[t]) seeds.push_back(skin_.same_as[v]);
     if (seeds.empty()) return true;
-    // The region only grows, so that a fold is not chased to and fro; wider when a narrow one does not do.
+    // The region only grows, so that a fold is not chased to and fro; all of it when a narrow one does not do.
+    if (round >= 12 && round % 8 == 4) seeds.insert(seeds.end(), region.begin(), region.end());
     for (const std::uint32_t v : seeds) {
       addToRegion(v);
-      if (round % 6 != 0) continue;
+      if (round % 4 != 0) continue;
       for (std::uint32_t e = skin_.graph.start[v]; e < skin_.graph.start[v + 1]; ++e)
         addToRegion(skin_.graph.neighbour[e]);
     }

@@ -56,9 +56,9 @@ class PoseLab {
   std::vector<Eigen::Vector3f> rest_normal_;
   std::vector<std::uint32_t> triangles_of_start_, triangles_of_;  // of each standing vertex
   std::vector<std::uint32_t> doubles_;                            // vertices that another one stands for
-  std::vector<std::uint32_t> in_contact_;     // vertices that resolveContacts may move, riders aside
-  std::vector<std::int32_t> slit_of_sample_;  // #V: the slit whose margin it is on, -1
-  std::vector<bool> free_;                    // skin that may be corrected
+  std::vector<std::uint32_t> in_contact_;  // vertices that resolveContacts may move, riders aside
+  std::vector<std::int32_t> slit_of_;      // #V: the slit where it gives way, -1
+  std::vector<bool> free_;                 // skin that may be corrected
 };
 
 }  // namespace volto::rig
