@@ -94,6 +94,9 @@ struct Shim {
              writeTo(to, from, bytes);
     };
     root = folder;
+    std::error_code ignored;  // what a program before this one left there
+    fs::remove_all(root + "/dev", ignored);
+    fs::remove_all(root + "/sys", ignored);
     for (const char* const sub : {"/dev", "/dev/v4l/by-id", "/sys/dev/char", "/sys/class/video4linux"})
       fs::create_directories(root + sub);
     showNodes();
