@@ -182,17 +182,13 @@ class BadPoints : public World {
   }
 };
 
-TEST_F(BadPoints, NoneGiven) {
-  expectRefused(volto({"rig", headMesh(), "-o", output("c.rig")}), 65, "rig", "2.1");
-  expectPointsRefused(R"({"feature_points": {}})", "2.1");
-}
-
-TEST_F(BadPoints, SomeMissingAreNamed) {
+TEST_F(BadPoints, SomeMissingAreFitted) {
   Json json = points();
   json["feature_points"].erase("8.3");
   json["feature_points"].erase("12.14");
-  expectPointsRefused(json.dump(), "8.3");
-  expectPointsRefused(json.dump(), "12.14");
+  const Finished run = volto({"rig", headMesh(), "--points", write("p.json", json.dump()), "-o", output("c.rig")});
+  EXPECT_EQ(run.status, 0) << run.err;
+  EXPECT_NE(run.err.find("2 feature points fitted to the 82 given"), std::string::npos) << run.err;
 }
 
 TEST_F(BadPoints, Repeated) {
@@ -224,6 +220,40 @@ TEST_F(BadPoints, NotJsonOrNotPoints) {
   expectPointsRefused(std::string(100'000, '['), "p.json");
   expectRefused(volto({"rig", headMesh(), "--points", path("none.json"), "-o", output("c.rig")}), 66, "rig",
                 "none.json");
+}
+
+class BadDefinition : public World {
+ protected:
+  void expectDefinitionRefused(const std::string& json, const std::string& said) const {
+    const Finished run = volto({"rig", headMesh(), "--points", headPoints(), "--regions", write("r.json", json), "-o", output("c.rig")});
+    expectRefused(run, 65, "rig", said);
+    EXPECT_NE(run.err.find("r.json"), std::string::npos) << run.err;
+  }
+};
+
+TEST_F(BadDefinition, UnknownKeysAndBadValuesAreNamed) {
+  expectDefinitionRefused(R"({"fade_ot": 1})", "did you mean \"fade_out\"?");
+  expectDefinitionRefused(R"({"regions": [{"triangle": 3, "stiffness": 99}]})", "regions[0].stiffness");
+  expectDefinitionRefused("{\n\"fade_out\": 1,\n}", "line 3");
+  expectDefinitionRefused(R"({"parts": [{"vertex": 4000000000, "follows": "jaw"}]})", "vertex 4000000000");
+  expectDefinitionRefused(R"({"subdivision": {"vertices": [4000000000]}})", "vertex 4000000000");
+}
+
+TEST_F(BadDefinition, AnExampleOfAnotherMeshIsNamed) {
+  const std::string folder = path("examples");
+  std::filesystem::create_directory(folder);
+  write("examples/smile.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  expectRefused(volto({"rig", headMesh(), "--points", headPoints(), "--subdivide", "auto:10", "--examples", folder, "-o", output("c.rig")}),
+                65, "rig", "smile.obj");
+  expectRefused(volto({"rig", headMesh(), "--points", headPoints(), "--subdivide", "auto:10", "--examples", path("none"), "-o", output("c.rig")}),
+                66, "rig", "none");
+}
+
+TEST_F(BadDefinition, WhatWasSavedRebuildsTheSameRig) {
+  ASSERT_EQ(volto({"rig", headMesh(), "--points", headPoints(), "--subdivide", "1", "--save-definition", output("r.json"), "-o", output("a.rig")}).status, 0);
+  const Finished again = volto({"rig", headMesh(), "--regions", output("r.json"), "-o", output("b.rig")});
+  ASSERT_EQ(again.status, 0) << again.err;
+  EXPECT_EQ(readFile(output("a.rig")), readFile(output("b.rig")));
 }
 
 }  // namespace

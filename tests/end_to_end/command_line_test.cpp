@@ -41,8 +41,10 @@ TEST_F(CommandLine, AMistypedVerbIsToldWhatWasMeant) {
 TEST_F(CommandLine, AMistypedOptionIsToldWhatWasMeant) {
   expectRefused(volto({"track", performance(), "-o", output("w.csv"), "--smothing", "2"}), 2, "track",
                 "did you mean --smoothing?");
-  expectRefused(volto({"rig", "a.obj", "-o", output("c.rig"), "--regions", "r.json"}), 2, "rig", "no option --regions");
-  expectRefused(volto({"rig", "a.obj", "-o", output("c.rig"), "--subdivide", "2"}), 2, "rig", "no option --subdivide");
+  expectRefused(volto({"rig", "a.obj", "-o", output("c.rig"), "--subdivid", "2"}), 2, "rig", "did you mean --subdivide?");
+  for (const char* wrong : {"seven", "7", "-1", "auto:0", "auto:x"})
+    expectRefused(volto({"rig", headMesh(), "--points", headPoints(), "-o", output("c.rig"), std::string("--subdivide=") + wrong}), 2,
+                  "rig", "--subdivide");
 }
 
 TEST_F(CommandLine, MissingAndImpossibleArgumentsAreWrongUsage) {

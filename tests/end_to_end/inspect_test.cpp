@@ -46,6 +46,15 @@ TEST_F(Inspect, FeaturePointsOfARigAreThoseThatItWasRiggedWith) {
   }
 }
 
+TEST_F(Inspect, APictureShowsTheMaskTheRegionsAndTheWorstExpression) {
+  const Finished run = volto({"inspect", this->rig(), "--picture", path("health.png")});
+  ASSERT_EQ(run.status, 0) << run.err;
+  const std::string png = readFile(path("health.png"));
+  EXPECT_EQ(png.substr(1, 3), "PNG");
+  EXPECT_GT(png.size(), 50'000U);
+  expectRefused(volto({"inspect", headMesh(), "--picture", output("other.png")}), 65, "inspect", "shows a rig");
+}
+
 TEST_F(Inspect, RigTellsItsHealth) {
   const Json rig = inspect(this->rig());
   for (const char* unit : {"IRISD0", "ES0", "ENS0", "MNS0", "MW0"})
@@ -57,6 +66,11 @@ TEST_F(Inspect, RigTellsItsHealth) {
   EXPECT_EQ(rig["blendshapes"].size(), 52U);
   EXPECT_GT(rig["operator"]["nonzeros"].get<int>(), 0);
   EXPECT_EQ(rig["operator"]["rows"], rig["vertices"]);
+  const Json& health = rig["health"];
+  EXPECT_EQ(health["regions"]["each"].size(), 136U);
+  EXPECT_LT(health["smoothness"]["border_jump"].get<double>(), 0.1);
+  EXPECT_EQ(health["unassigned"]["count"], 0);
+  EXPECT_EQ(health["expressions"]["shapes"], 52);
   const Finished words = volto({"inspect", this->rig()});
   EXPECT_EQ(words.status, 0);
   EXPECT_NE(words.out.find("kind: rig"), std::string::npos);

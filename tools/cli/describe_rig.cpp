@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "rig/rig_file.h"
+#include "tools/cli/describe_health.h"
 #include "tools/cli/file_description.h"
 
 namespace volto::cli {
@@ -91,8 +92,12 @@ Json describeRig(const std::filesystem::path& path) {
   }
   out["rigid_parts"] = std::move(parts);
   out["feature_points"] = featurePointsOf(rig);
+  if (!rig.refined.empty())
+    out["refined_mask"] = {{"points", rig.refined.pointCount()},
+                           {"triangles", rig.refined.triangles.size()},
+                           {"nonzeros", rig.refined.to_vertices.weight.size()}};
   Json problems = Json::array();
-  for (const std::string& substitution : rig.fapu.substitutions) problems.push_back(substitution);
+  out["health"] = describeHealth(rig, problems);
   out["problems"] = std::move(problems);
   return out;
 }
