@@ -179,6 +179,14 @@ SurfacePlace placeOf(const TargetSurface& target, const SurfaceHit& hit) {
   return {target.triangle(hit.triangle), hit.barycentric};
 }
 
+// The nearest point that looks the same way, unless one that does not quite is much nearer.
+SurfaceHit readOff(const TargetSurface& target, const Eigen::Vector3d& at, const Eigen::Vector3d& normal) {
+  const SurfaceHit alike = target.find(at, normal, 0.3, 0.3), near = target.find(at, normal, -0.2, 0.3);
+  if (alike.triangle >= 0 && alike.distance < 2 * near.distance + 0.03) return alike;
+  if (near.triangle >= 0) return near;
+  return target.find(at, normal, -2, std::numeric_limits<double>::infinity());
+}
+
 // A point on the target. Points of the loops (lids, inner lips) are vertices where the mesh is fine enough: a position
 // between lips that touch would belong to both.
 FeaturePointChoice choiceFor(std::size_t p, const TargetSurface& target, const SurfaceHit& hit, const Similarity& frame,
@@ -286,8 +294,7 @@ FittedPoints fitPoints(const Mesh& mesh, const FeaturePointChoices& given, std::
     }
     const Eigen::Vector3d at = placeOn(face.positions, head.points[p]),
                           normal = placeOn(normals, head.points[p]).normalized();
-    SurfaceHit hit = target.find(at, normal, 0.3, 0.3);
-    if (hit.triangle < 0) hit = target.find(at, normal, -2, std::numeric_limits<double>::infinity());
+    const SurfaceHit hit = readOff(target, at, normal);
     out.points.emplace(p, choiceFor(p, target, hit, frame, vertex_taken));
     const double deviation = 0.5 * warp.deviation(human.points.row(static_cast<Eigen::Index>(p)));
     const double error2 = std::pow(human.spread[p], 2) + deviation * deviation + hit.distance * hit.distance;

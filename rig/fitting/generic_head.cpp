@@ -99,7 +99,7 @@ void bendToProportions(const HumanFace& human, const FeaturePointPositions& poin
   for (std::size_t p = 0; p < kFeaturePointCount; ++p) {
     const auto row = static_cast<Eigen::Index>(p);
     // Points on a line of the face mean the same on every head; others only about.
-    const double sigma = isLoopPoint(p) ? 0.002 : 0.01 + human.spread[p] / 5;
+    const double sigma = isLoopPoint(p) ? 0.002 : 0.005 + human.spread[p] / 15;
     pairs.push_back({points.row(row), human.points.row(row), sigma});
   }
   const Similarity similarity = fitSimilarity(pairs).similarity;
@@ -185,6 +185,21 @@ void cutOutFace(GenericHead& head, const std::array<std::uint32_t, kFeaturePoint
   }
 }
 
+// Points were placed on the nearest surface; now the surface comes to them.
+void passThroughPoints(GenericHead& head) {
+  std::vector<WarpLandmark> pairs;
+  for (std::size_t p = 0; p < kFeaturePointCount; ++p) {
+    Eigen::RowVector3d at = Eigen::RowVector3d::Zero();
+    for (std::size_t i = 0; i < 3; ++i)
+      at += head.points[p].weights[i] * head.face.positions.row(head.points[p].vertices[i]);
+    pairs.push_back({at.transpose(), head.human.points.row(static_cast<Eigen::Index>(p)), 0.003});
+  }
+  const LandmarkWarp warp(std::move(pairs));
+  for (Mesh* mesh : {&head.mesh, &head.face})
+    for (Eigen::Index v = 0; v < mesh->positions.rows(); ++v)
+      mesh->positions.row(v) = warp(mesh->positions.row(v)).transpose();
+}
+
 GenericHead bentHead(Mesh mesh, const FeaturePointPositions& points, const HumanFace& human) {
   GenericHead head;
   head.mesh = std::move(mesh);
@@ -199,6 +214,7 @@ GenericHead bentHead(Mesh mesh, const FeaturePointPositions& points, const Human
   head.skin.resize(head.mesh.vertexCount());
   for (std::size_t v = 0; v < head.skin.size(); ++v) head.skin[v] = skin.component[v] == skin.component[vertex[0]];
   cutOutFace(head, vertex);
+  passThroughPoints(head);
   return head;
 }
 

@@ -22,13 +22,14 @@ struct Stage {
   double reach;       // distance of half belief
   double min_cosine;  // of the normals
 };
-constexpr std::array<Stage, 7> kStages = {{{0.50, 0.20, 0.50},
+constexpr std::array<Stage, 8> kStages = {{{0.50, 0.20, 0.50},
                                            {0.36, 0.15, 0.50},
                                            {0.26, 0.11, 0.55},
                                            {0.20, 0.08, 0.60},
                                            {0.15, 0.06, 0.60},
                                            {0.12, 0.05, 0.60},
-                                           {0.10, 0.05, 0.60}}};
+                                           {0.10, 0.05, 0.60},
+                                           {0.08, 0.05, 0.60}}};
 // How much of the way along the surface to the nearest point is asked for: little, since in smooth skin it says
 // nothing.
 constexpr double kTangential = 0.15;
