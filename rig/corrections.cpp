@@ -209,10 +209,11 @@ class CorrectionMaker {
       }
     for (int round = 0; round < 3; ++round) {
       closeLids(slit, extra);
-      if (!lab_.unfold(extra, margins)) continue;
+      lab_.unfold(extra, margins);
       const std::vector<float> gap = gaps(slit);
-      if (*std::max_element(gap.begin(), gap.end()) < 0.004F * es_) break;
+      if (*std::max_element(gap.begin(), gap.end()) < 0.006F * es_) return;
     }
+    closeLids(slit, extra);  // closed is what a blink must be
   }
 
   // --- cheeks

@@ -66,7 +66,7 @@ class Motions {
     hinge[2] = std::min(hinge[2], chin[2] - 0.7 * es_);
     // On that line where it crosses the depth of the ears, unless that is nowhere near them.
     if (-d[1] > 0.05 * es_)
-      hinge[1] = std::clamp(halfway[1] - (hinge[2] - halfway[2]) * d[2] / d[1], ear[1] - 0.7 * es_, ear[1] + 0.4 * es_);
+      hinge[1] = std::clamp(halfway[1] - (hinge[2] - halfway[2]) * d[2] / d[1], ear[1] - 0.5 * es_, ear[1] + 0.4 * es_);
     out.pivot = toFloat(rig_.mesh_from_head * hinge);
 
     constexpr double kSkinOfBone = 0.87;
@@ -77,7 +77,8 @@ class Motions {
         const Eigen::Vector3d arm = chin - hinge;
         const double length = std::hypot(arm[1], arm[2]);
         // Positive about +x: what is in front goes down.
-        const double angle = 2 * std::asin(std::clamp(0.5 * std::hypot(by[1], by[2]) / length, 0.0, 0.7));
+        const double angle =
+            2 * std::asin(std::clamp(0.5 * std::hypot(by[1], by[2]) / length, 0.0, 0.3));  // 35 degrees at most
         out.turns.push_back(turn(k, {angle, 0, 0}, {0, 0, 0}));
       } else if (shape.name == "jawForward") {
         out.turns.push_back(turn(k, {0, 0, 0}, {0, by[1], by[2]}));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <Eigen/Geometry>
 
@@ -12,7 +13,8 @@ constexpr int kMostRounds = 72;
 constexpr int kHeldRounds = 48;  // then what should be held gives way too
 constexpr float kLeaning = 0.4F;
 constexpr float kFoldCosine = 0.12F;  // a little before a triangle stands at right angles to where it was
-constexpr float kLeastArea = 0.01F;   // of what it was
+constexpr float kFolded = 0.02F;
+constexpr float kLeastArea = 0.01F;  // of what it was
 
 }  // namespace
 
@@ -123,12 +125,22 @@ bool PoseLab::unfold(DenseDisplacement& extra, std::span<const std::uint32_t> he
     for (std::uint32_t i = triangles_of_start_[v]; i < triangles_of_start_[v + 1]; ++i) suspect(triangles_of_[i]);
   };
   std::vector<Eigen::Vector3f> moved(neutral_.size(), Eigen::Vector3f::Zero()), next;
+  DenseDisplacement best = extra;
+  std::size_t fewest = std::numeric_limits<std::size_t>::max();
   for (int round = 0; round < kMostRounds; ++round) {
     seeds.clear();
-    for (const std::uint32_t t : suspects)
-      if (uprightness(t) < kFoldCosine)
-        for (const std::uint32_t v : triangles_[t]) seeds.push_back(skin_.same_as[v]);
+    std::size_t folded = 0;
+    for (const std::uint32_t t : suspects) {
+      const float upright = uprightness(t);
+      if (upright >= kFoldCosine) continue;
+      folded += upright < kFolded ? 1 : 0;
+      for (const std::uint32_t v : triangles_[t]) seeds.push_back(skin_.same_as[v]);
+    }
     if (seeds.empty()) return true;
+    if (folded < fewest) {
+      fewest = folded;
+      best = extra;
+    }
     // The region only grows, so that a fold is not chased to and fro; all of it when a narrow one does not do.
     if (round >= 12 && round % 8 == 4) seeds.insert(seeds.end(), region.begin(), region.end());
     for (const std::uint32_t v : seeds) {
@@ -175,7 +187,9 @@ bool PoseLab::unfold(DenseDisplacement& extra, std::span<const std::uint32_t> he
     for (const std::uint32_t v : in_contact_) place(v, extra);
     resolveContacts(rig_.contacts, neutral_, positions_);
   }
-  return false;
+  extra = std::move(best);
+  evaluate(extra);
+  return fewest == 0;
 }
 
 SparseDisplacement PoseLab::sparse(const DenseDisplacement& dense) const {
