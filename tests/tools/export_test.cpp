@@ -68,6 +68,23 @@ TEST(CharacterParts, EyesAreApartAndSeamsAreCut) {
   EXPECT_GT(parts.materials[0].roughness, parts.materials[1].roughness) << "an eye is wet";
 }
 
+TEST(CharacterParts, EyeThatIsJoinedToTheFaceStaysInIt) {
+  rig::Rig rig = character();
+  for (const std::uint32_t v : {0U, 1U, rig.rigid_parts[0].vertices[0]}) {
+    rig.neutral.corner_vertices.push_back(v);
+    rig.neutral.corner_texcoords.push_back({0.0F, 0.0F});
+  }
+  rig.neutral.polygon_start.push_back(static_cast<std::uint32_t>(rig.neutral.corner_vertices.size()));
+  rig.neutral.polygon_material.push_back(0);
+  const CharacterParts parts = takeApart(rig);
+  ASSERT_EQ(parts.parts.size(), 2U);
+  EXPECT_EQ(parts.parts[1].name, "rightEye");
+  std::size_t corners = 0;
+  for (const ExportPart& part : parts.parts)
+    for (const ExportPart::Group& group : part.groups) corners += group.corners.size();
+  EXPECT_EQ(corners, 3 * rig::triangulate(rig.neutral).size()) << "no triangle is lost";
+}
+
 TEST(Glb, ReadBackItIsTheSameMesh) {
   const rig::Rig rig = character();
   const rig::Mesh mesh = rig::parseGltf(formatGlb(rig), "sheet.glb");

@@ -59,12 +59,27 @@ class Cutter {
       }
       if (any) out_.parts.push_back(std::move(part));
     }
+    keepJoinedEyes();
     copies_.resize(mesh_.vertexCount(), 0);
     for (std::uint32_t v = 0; v < mesh_.vertexCount(); ++v) {
       ExportPart& part = out_.parts[part_of_[v]];
       first_.push_back(static_cast<std::uint32_t>(part.vertex.size()));
       addVertex(part, v, {0.0F, 0.0F});
     }
+  }
+
+  // An eye that some polygon joins to the rest cannot turn by itself: it stays in the face.
+  void keepJoinedEyes() {
+    std::array<bool, 3> joined{};
+    for (std::size_t p = 0; p < mesh_.polygonCount(); ++p) {
+      const std::uint32_t begin = mesh_.polygon_start[p], end = mesh_.polygon_start[p + 1];
+      for (std::uint32_t c = begin + 1; c < end; ++c) {
+        const std::uint8_t a = part_of_[mesh_.corner_vertices[begin]], b = part_of_[mesh_.corner_vertices[c]];
+        if (a != b) joined[a] = joined[b] = true;
+      }
+    }
+    for (std::uint8_t& part : part_of_)
+      if (joined[part]) part = 0;
   }
 
   void addVertex(ExportPart& part, std::uint32_t v, std::array<float, 2> uv) {
@@ -93,9 +108,7 @@ class Cutter {
 
   void addPolygon(std::size_t p) {
     const std::uint32_t begin = mesh_.polygon_start[p], end = mesh_.polygon_start[p + 1];
-    std::uint8_t number = part_of_[mesh_.corner_vertices[begin]];
-    for (std::uint32_t c = begin; c < end; ++c)
-      if (part_of_[mesh_.corner_vertices[c]] != number) return;  // joined to the face: no rigid part, so this cannot be
+    const std::uint8_t number = part_of_[mesh_.corner_vertices[begin]];
     ExportPart& part = out_.parts[number];
     const std::uint32_t material = materialOfPolygon(p);
     auto group = std::find_if(part.groups.begin(), part.groups.end(),
