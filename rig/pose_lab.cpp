@@ -11,6 +11,7 @@ namespace {
 
 constexpr int kMostRounds = 72;
 constexpr int kHeldRounds = 48;  // then what should be held gives way too
+constexpr int kPatience = 48;    // rounds without a better one
 constexpr float kLeaning = 0.4F;
 constexpr float kFoldCosine = 0.12F;  // a little before a triangle stands at right angles to where it was
 constexpr float kFolded = 0.02F;
@@ -127,6 +128,7 @@ bool PoseLab::unfold(DenseDisplacement& extra, std::span<const std::uint32_t> he
   std::vector<Eigen::Vector3f> moved(neutral_.size(), Eigen::Vector3f::Zero()), next;
   DenseDisplacement best = extra;
   std::size_t fewest = std::numeric_limits<std::size_t>::max();
+  int best_round = 0;
   for (int round = 0; round < kMostRounds; ++round) {
     seeds.clear();
     std::size_t folded = 0;
@@ -137,8 +139,10 @@ bool PoseLab::unfold(DenseDisplacement& extra, std::span<const std::uint32_t> he
       for (const std::uint32_t v : triangles_[t]) seeds.push_back(skin_.same_as[v]);
     }
     if (seeds.empty()) return true;
+    if (round > best_round + kPatience) break;
     if (folded < fewest) {
       fewest = folded;
+      best_round = round;
       best = extra;
     }
     // The region only grows, so that a fold is not chased to and fro; all of it when a narrow one does not do.

@@ -9,6 +9,7 @@
 #include "rig/rig_file.h"
 #include "tools/cli/describe_health.h"
 #include "tools/cli/exit_status.h"
+#include "tools/cli/expression_report.h"
 #include "tools/cli/file_description.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/read_input.h"
@@ -21,21 +22,32 @@ namespace {
 
 struct Options {
   std::string file;
-  std::string picture;
+  std::string picture, sheet, combinations;
+  int cell_px = 256;
   bool json = false;
 };
 
 int run(const Options& options) {
   requireReadable(options.file);
-  if (!options.picture.empty()) {
-    requireDifferent(options.file, options.picture);
-    requireReplaceable(options.picture);
+  bool pictures = false;
+  for (const std::string* path : {&options.picture, &options.sheet, &options.combinations}) {
+    if (path->empty()) continue;
+    requireDifferent(options.file, *path);
+    requireReplaceable(*path);
+    pictures = true;
   }
-  const Json description = describeFile(options.file);
-  if (!options.picture.empty() && description.value("kind", "") != "rig")
-    throw CommandError(kBadData,
-                       options.file + ": --picture shows a rig; this is a " + description.value("kind", "file"));
-  if (!options.picture.empty()) writeRigPicture(options.picture, rig::readRig(options.file));
+  Json description = describeFile(options.file);
+  const bool is_rig = description.value("kind", "") == "rig";
+  if (pictures && !is_rig)
+    throw CommandError(kBadData, options.file + ": --picture, --sheet and --combinations show a rig; this is a " +
+                                     description.value("kind", "file"));
+  if (pictures || (is_rig && options.json)) {
+    const rig::Rig rig = rig::readRig(options.file);
+    if (!options.picture.empty()) writeRigPicture(options.picture, rig);
+    if (!options.sheet.empty()) writeShapeSheet(options.sheet, rig, options.cell_px);
+    if (!options.combinations.empty()) writeCombinationSheet(options.combinations, rig, options.cell_px);
+    if (options.json) description["expressions"] = expressionReport(rig);
+  }
   std::string text;
   if (options.json) {
     text = description.dump(1) + "\n";
@@ -63,6 +75,14 @@ RunVerb defineInspect(CLI::App& app) {
   app.add_option("--picture", options->picture,
                  "for a rig: a picture of the mask on the mesh, the regions in colour and the worst expressions")
       ->type_name("F.png");
+  app.add_option("--sheet", options->sheet, "for a rig: a picture of neutral from three sides and of every blendshape")
+      ->type_name("F.png");
+  app.add_option("--combinations", options->combinations, "for a rig: a picture of twelve combined expressions")
+      ->type_name("F.png");
+  app.add_option("--cell", options->cell_px, "size of a cell of these sheets")
+      ->type_name("PX")
+      ->capture_default_str()
+      ->check(CLI::Range(64, 1024));
   return [options] { return run(*options); };
 }
 
