@@ -12,8 +12,15 @@ namespace volto::rig {
 namespace {
 
 constexpr std::size_t kPlanes = 4;
-constexpr std::size_t kCandidates = 12;
-constexpr std::size_t kStudied = 2;
+constexpr double kWorthStudying = 0.25;  // likeness at a glance
+
+// How much is tried.
+struct Effort {
+  std::size_t candidates, studied;
+  double smallest;  // eye separation, in root mean squares of the samples
+};
+constexpr Effort kWhole{12, 2, 0.09};
+constexpr Effort kPart{6, 1, 0.3};  // the part is about as large as a head
 
 // Samples as a cloud of its own: centroid at the origin, root mean square distance 1.
 struct Cloud {
@@ -48,32 +55,37 @@ FaceFrame onItsOwnPlane(std::span<const SurfaceSample> samples, FaceFrame frame,
 }
 
 void searchOnPlanes(const NormalisedSurface& surface, const Cloud& cloud, std::span<const SymmetryPlane> planes,
-                    SearchResult& result) {
+                    const Effort& effort, SearchResult& result) {
   if (planes.empty()) return;
   std::vector<FaceMatch> glances;
-  for (const PoseCandidate& pose : searchPoses(cloud.samples, planes, kCandidates))
+  for (const PoseCandidate& pose : searchPoses(cloud.samples, planes, effort.candidates, effort.smallest))
     glances.push_back(glanceAtFace(surface, cloud.outside(pose.frame)));
   result.planes += planes.size();
   result.poses += glances.size();
   std::stable_sort(glances.begin(), glances.end(),
                    [](const FaceMatch& a, const FaceMatch& b) { return a.likeness > b.likeness; });
   // The better ones are studied: a candidate that lies a little off may be the best face.
-  for (std::size_t k = 0; k < std::min(kStudied, glances.size()); ++k) {
+  for (std::size_t k = 0; k < std::min(effort.studied, glances.size()); ++k) {
+    if (glances[k].likeness < kWorthStudying) {
+      if (glances[k].likeness > result.best.likeness) result.best = glances[k];
+      break;
+    }
     FaceMatch match = studyFace(surface, glances[k].frame);
     if (match.likeness > result.best.likeness) result.best = std::move(match);
     if (result.best.likeness > 0.85) break;
   }
 }
 
-void searchCloud(const NormalisedSurface& surface, const Cloud& cloud, bool thorough, SearchResult& result) {
+void searchCloud(const NormalisedSurface& surface, const Cloud& cloud, const Effort& effort, bool thorough,
+                 SearchResult& result) {
   const std::vector<SymmetryPlane> planes = findSymmetryPlanes(cloud.samples, kPlanes);
   if (planes.empty()) return;
   result.best_mirrored = std::max(result.best_mirrored, planes.front().score);
   std::size_t good = 1;
   while (good < planes.size() && planes[good].score > 0.85 * planes.front().score) ++good;
-  searchOnPlanes(surface, cloud, std::span(planes).first(good), result);
+  searchOnPlanes(surface, cloud, std::span(planes).first(good), effort, result);
   if (result.best.likeness < kFaceLikeness && thorough)
-    searchOnPlanes(surface, cloud, std::span(planes).subspan(good), result);
+    searchOnPlanes(surface, cloud, std::span(planes).subspan(good), effort, result);
 }
 
 // Balls that cover the samples: a head on a body that is not symmetric has a plane of its own.
@@ -104,10 +116,10 @@ std::vector<std::vector<SurfaceSample>> parts(std::span<const SurfaceSample> sam
 SearchResult searchFace(const NormalisedSurface& surface, std::span<const SurfaceSample> samples, bool thorough) {
   SearchResult result;
   const Cloud cloud(samples);
-  searchCloud(surface, cloud, thorough, result);
+  searchCloud(surface, cloud, kWhole, thorough, result);
   if (result.best.likeness < kFaceLikeness && thorough)
-    for (const std::vector<SurfaceSample>& part : parts(samples, 0.7 * cloud.size, 6)) {
-      searchCloud(surface, Cloud(part), false, result);
+    for (const std::vector<SurfaceSample>& part : parts(samples, 0.7 * cloud.size, 5)) {
+      searchCloud(surface, Cloud(part), kPart, false, result);
       if (result.best.likeness > kFaceLikeness) break;
     }
   if (result.poses == 0) return result;

@@ -15,8 +15,8 @@ struct FaceTemplate {
   // them on the face than on the skull. In an order in which any first part is spread over the whole.
   std::vector<Eigen::Vector3d> points, normals;
   std::vector<bool> on_face;
-  std::array<Relief, 2> relief;     // at kCoarsePixel and kFinePixel
-  std::array<Grid, 2> mask;         // how much a pixel counts: the face from brows to chin, softly
+  std::array<Relief, 2> relief;  // at kCoarsePixel and kFinePixel
+  std::array<Grid, 2> mask;      // how much a pixel counts: the face from brows to chin, softly
   // Soft windows around the left eye, the right eye, the nose and the mouth.
   std::array<std::array<Grid, 4>, 2> parts;
   FeaturePointPositions landmarks;  // head frame, eye separations

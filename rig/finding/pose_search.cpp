@@ -180,7 +180,7 @@ void prune(std::vector<Ranked>& ranked, std::size_t most) {
 }  // namespace
 
 std::vector<PoseCandidate> searchPoses(std::span<const SurfaceSample> samples, std::span<const SymmetryPlane> planes,
-                                       std::size_t count) {
+                                       std::size_t count, double smallest) {
   constexpr int kTurns = 12;
   // A face alone is about one eye separation in root mean square, a head two, a standing person eight.
   constexpr double kSizes[] = {1.05, 0.7, 0.47, 0.31, 0.21, 0.14, 0.1};
@@ -188,7 +188,8 @@ std::vector<PoseCandidate> searchPoses(std::span<const SurfaceSample> samples, s
   for (const SymmetryPlane& plane : planes) surfaces.push_back(fold(samples, plane));
   std::vector<Ranked> ranked;
   for (std::size_t k = 0; k < surfaces.size(); ++k)
-    for (const double size : kSizes)
+    for (const double size : kSizes) {
+      if (size < smallest) continue;
       for (const Eigen::Vector2d& place : spreadPlaces(surfaces[k], 1.6 * size, 1.1 * size, 120))
         for (int turn = 0; turn < kTurns; ++turn)
           for (const double facing : {1.0, -1.0}) {
@@ -203,6 +204,7 @@ std::vector<PoseCandidate> searchPoses(std::span<const SurfaceSample> samples, s
             align(surfaces[k], pose, 40, 0.5, true);
             ranked.push_back({pose, k});
           }
+    }
   prune(ranked, 400);
   for (Ranked& r : ranked) {
     for (int i = 0; i < 3; ++i) align(surfaces[r.plane], r.pose, 80, 0.4, true);

@@ -18,8 +18,9 @@ struct PoseCandidate {
 
 // On each plane of symmetry four unknowns are left (turn and place in the plane, size) and which way the face looks:
 // all of them are tried on a raster as coarse as closest-point iterations can mend, the better ones are followed.
-// At most `count` candidates that differ, best first.
+// At most `count` candidates that differ, best first. Eye separations from `smallest` up are tried; the samples' root
+// mean square distance from the origin is 1.
 std::vector<PoseCandidate> searchPoses(std::span<const SurfaceSample> samples, std::span<const SymmetryPlane> planes,
-                                       std::size_t count);
+                                       std::size_t count, double smallest);
 
 }  // namespace volto::rig

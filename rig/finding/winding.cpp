@@ -19,6 +19,8 @@ struct Patches {
   std::vector<std::uint32_t> patch;  // per polygon
   std::vector<bool> turned;          // per polygon: against its patch's first polygon
   std::size_t count = 0;
+  std::vector<std::size_t> polygons;  // per patch
+  std::vector<bool> open;             // per patch: it has a border
 };
 
 // Over edges of exactly two polygons: neighbours must run along them in opposite directions.
@@ -40,6 +42,7 @@ Patches orientablePatches(const Mesh& mesh) {
     bool turned;
   };
   std::vector<std::vector<Link>> links(mesh.polygonCount());
+  std::vector<bool> at_border(mesh.polygonCount());
   for (std::size_t i = 0; i < edges.size();) {
     std::size_t end = i + 1;
     while (end < edges.size() && edges[end].low == edges[i].low && edges[end].high == edges[i].high) ++end;
@@ -47,11 +50,14 @@ Patches orientablePatches(const Mesh& mesh) {
       const bool turned = edges[i].forward == edges[i + 1].forward;
       links[edges[i].polygon].push_back({edges[i + 1].polygon, turned});
       links[edges[i + 1].polygon].push_back({edges[i].polygon, turned});
+    } else {
+      for (std::size_t k = i; k < end; ++k) at_border[edges[k].polygon] = true;
     }
     i = end;
   }
   constexpr std::uint32_t kNone = ~0U;
-  Patches patches{std::vector<std::uint32_t>(mesh.polygonCount(), kNone), std::vector<bool>(mesh.polygonCount()), 0};
+  Patches patches{
+      std::vector<std::uint32_t>(mesh.polygonCount(), kNone), std::vector<bool>(mesh.polygonCount()), 0, {}, {}};
   std::vector<std::uint32_t> queue;
   for (std::uint32_t first = 0; first < mesh.polygonCount(); ++first) {
     if (patches.patch[first] != kNone) continue;
@@ -65,6 +71,8 @@ Patches orientablePatches(const Mesh& mesh) {
           queue.push_back(link.polygon);
         }
     ++patches.count;
+    patches.polygons.push_back(queue.size());
+    patches.open.push_back(std::any_of(queue.begin(), queue.end(), [&](std::uint32_t p) { return at_border[p]; }));
   }
   return patches;
 }
@@ -107,8 +115,10 @@ Winding findReversedPolygons(const Mesh& mesh, std::span<const SurfaceSample> sa
   winding.face_reversed = face < 0;
   for (std::uint32_t p = 0; p < mesh.polygonCount(); ++p) {
     const std::uint32_t patch = patches.patch[p];
-    // The little that is seen of a mouth's inside from below the neck says nothing about the mouth.
-    const bool says = voters[patch] > 0.25 * sampled[patch] && std::abs(vote[patch]) > 0.4 * voters[patch];
+    // The little that is seen of a mouth's inside from below the neck says nothing about the mouth, and a card of
+    // lashes or hair is seen from one side only because its back lies on the skin.
+    const bool card = patches.open[patch] && patches.polygons[patch] < mesh.polygonCount() / 20;
+    const bool says = !card && voters[patch] > 0.25 * sampled[patch] && std::abs(vote[patch]) > 0.4 * voters[patch];
     const bool wrong = says ? (vote[patch] < 0) != patches.turned[p] : rest < 0;
     if (wrong) winding.reversed.push_back(p);
   }
