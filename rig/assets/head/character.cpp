@@ -157,7 +157,9 @@ std::vector<double> freedom(const HalfMesh& mesh) {
     if (v.strip == Strip::eye && v.ring < kLidCrease)  // the fold over the lid, where there is one
       out.push_back(0.7 * (kLidCrease - v.ring));
     else
-      out.push_back(free ? lips * lids * nose * muzzle * smoothstep(-2.0, 4.0, v.position.z) : 0);
+      out.push_back(free ? lips * lids * nose * muzzle * smoothstep(-2.0, 4.0, v.position.z) *
+                               (1 - smoothstep(1.5, 8.5, v.position.y - 0.2 * v.position.z))
+                         : 0);
   }
   return out;
 }
@@ -196,7 +198,7 @@ Character creature() {
   Proportions k;
   k.skull_width = 1.28;
   k.skull_height = 1.08;
-  k.skull_length = 1.02;
+  k.skull_length = 0.96;
   k.neck_thickness = 0.66;
   k.eye_size = 1.68;
   k.eye_shift = {1.05, 0.25, -0.60};
@@ -206,19 +208,19 @@ Character creature() {
   k.pupil_size = 1.45;
   k.nose_width = 1.15;
   k.nose_height = 0.78;
-  k.nose_depth = 0.66;
+  k.nose_depth = 0.85;
   k.mouth_width = 1.38;
   k.mouth_smile = 0.85;
   k.chin_width = 0.80;
   k.chin_rise = 0.5;
-  k.chin_retreat = 0.5;
+  k.chin_retreat = 0.1;
   k.ear_size = 1.35;
   k.ear_tip = 3.6;
   k.ear_flare = 0.75;
   k.hair_thickness = 0;
   k.smoothness = 60;
   Tints tints;
-  tints.blush = {0.95, 0.72, 0.62};
+  tints.blush = {0.90, 0.82, 0.70};
   tints.shade = {0.45, 0.60, 0.62};
   tints.crown = {0.50, 0.62, 0.74};
   return {"volto_creature", "Volto's creature", k, paletteOf(kCreatureColours), tints};

@@ -190,7 +190,7 @@ HalfMesh makeEyeball(double iris_size, double pupil_size) {
 }
 
 HalfMesh makeUpperTeeth() { return makeTeeth({2.45, 8.80, 5.6, -6.05, -6.98}, 0.88); }
-HalfMesh makeLowerTeeth() { return makeTeeth({2.25, 8.52, 5.5, -7.75, -6.88}, 0.80); }
+HalfMesh makeLowerTeeth() { return makeTeeth({2.25, 8.52, 5.5, -7.66, -6.99}, 0.80); }
 
 HalfMesh makeTongue() {
   HalfMesh mesh;
@@ -202,7 +202,7 @@ HalfMesh makeTongue() {
                  thick = 0.18 + 0.34 * std::sqrt(t);
     const double groove =
         0.10 * smoothstep(0.05, 0.4, t) * (1 - smoothstep(0.0, 0.35, std::sin(a))) * (column < kAround / 2 ? 1 : 0);
-    const Vec3 p{width * std::sin(a), -7.55 + 0.12 * t + thick * std::cos(a) - groove, 8.0 - 3.0 * t};
+    const Vec3 p{width * std::sin(a), -7.47 + 0.16 * t + thick * std::cos(a) - groove, 8.0 - 3.0 * t};
     return vertex(p, column == 0 || column == kAround);
   };
   addSheet(
@@ -210,7 +210,7 @@ HalfMesh makeTongue() {
       [](int, int) { return Material::tongue; });
   // Tip: a fan from the middle.
   const int centre = static_cast<int>(mesh.vertices.size());
-  mesh.vertices.push_back(vertex({0, -7.55, 8.05}, true));
+  mesh.vertices.push_back(vertex({0, -7.47, 8.05}, true));
   for (int c = 0; c < kAround; ++c) {
     const int row = kAlong * (kAround + 1);
     mesh.polygons.push_back({{row + c, centre, row + c + 1},
@@ -218,7 +218,7 @@ HalfMesh makeTongue() {
                              {{c + 0.0, -kAlong}, {c + 0.5, -kAlong - 1}, {c + 1.0, -kAlong}}});
   }
   const int root = static_cast<int>(mesh.vertices.size());
-  mesh.vertices.push_back(vertex({0, -7.43, 4.9}, true));
+  mesh.vertices.push_back(vertex({0, -7.31, 4.9}, true));
   for (int c = 0; c < kAround; ++c)
     mesh.polygons.push_back({{root, c, c + 1}, Material::tongue, {{c + 0.5, 1}, {c + 0.0, 0}, {c + 1.0, 0}}});
   return mesh;

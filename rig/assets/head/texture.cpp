@@ -235,7 +235,7 @@ class FaceUnwrapper {
         pull(a, c, half / lc);
       }
     // Successive over-relaxation, in a fixed order.
-    constexpr double kOver = 1.5;
+    constexpr double kOver = 1.6;
     for (int round = 0; round < 10000; ++round) {
       double largest = 0;
       for (std::size_t i = 0; i < pulls.size(); ++i) {
@@ -250,7 +250,7 @@ class FaceUnwrapper {
         at_[i] = {at_[i][0] + kOver * du, at_[i][1] + kOver * dv};
         largest = std::max({largest, std::fabs(du), std::fabs(dv)});
       }
-      if (largest < 1e-8) break;
+      if (largest < 1e-6) break;
     }
   }
 
