@@ -296,7 +296,7 @@ FittedPoints fitPoints(const Mesh& mesh, const FeaturePointChoices& given, std::
                           normal = placeOn(normals, head.points[p]).normalized();
     const SurfaceHit hit = readOff(target, at, normal);
     out.points.emplace(p, choiceFor(p, target, hit, frame, vertex_taken));
-    const double deviation = 0.5 * warp.deviation(human.points.row(static_cast<Eigen::Index>(p)));
+    const double deviation = 0.75 * warp.deviation(human.points.row(static_cast<Eigen::Index>(p)));
     const double error2 = std::pow(human.spread[p], 2) + deviation * deviation + hit.distance * hit.distance;
     out.confidence[p] = 1 / (1 + error2 / (kHalfConfidence_es * kHalfConfidence_es));
     if (out.confidence[p] < kDoubtful) out.to_check.push_back(p);
@@ -309,9 +309,7 @@ FittedPoints fitPoints(const Mesh& mesh, const FeaturePointChoices& given, std::
   }
   std::stable_sort(out.to_check.begin(), out.to_check.end(),
                    [&](std::size_t a, std::size_t b) { return out.confidence[a] < out.confidence[b]; });
-  if (face.folded > 0)
-    out.notes.push_back(std::to_string(face.folded) +
-                        " triangles of the generic face folded on the way and were laid flat");
+  out.folded_triangles = face.folded;
   out.dense = denseCorrespondence(head, start, warp, face, target, on_mesh.inFrameOf(frame, false));
   return out;
 }

@@ -38,6 +38,7 @@ struct FittedPoints {
   std::array<double, kFeaturePointCount> confidence{};  // 0..1; given points: 1
   std::vector<std::size_t> to_check;                    // feature points that a person should look at, worst first
   std::vector<std::string> notes;                       // what a person should know, one sentence each
+  std::size_t folded_triangles = 0;                     // of the generic face, that had to be unfolded on the way
   std::vector<CorrespondingPlace> dense;                // per vertex of the generic head's mesh
 };
 

@@ -1,6 +1,7 @@
 // Points from few: what is kept, what is refused, what is mended. On the shipped heads; accuracy on people is measured
 // in fitting_accuracy_test.cpp.
 #include <algorithm>
+#include <numeric>
 
 #include <gtest/gtest.h>
 
@@ -11,6 +12,13 @@ namespace volto::rig {
 namespace {
 
 using test::KnownHead;
+
+// Ten times slower there, and seen often enough in the other tests.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define VOLTO_PLAIN_BUILD_ONLY() GTEST_SKIP() << "SKIPPED: measured in the plain build"
+#else
+#define VOLTO_PLAIN_BUILD_ONLY() static_cast<void>(0)
+#endif
 
 class FitPoints : public testing::Test {
  protected:
@@ -51,6 +59,7 @@ TEST_F(FitPoints, GivenPointsStayExactlyWhereTheyAre) {
 }
 
 TEST_F(FitPoints, ShippedHeadIsFoundAgainWhereverItLies) {
+  VOLTO_PLAIN_BUILD_ONLY();
   for (const unsigned seed : {0U, 3U}) {
     const KnownHead placed = adult_->placedAnyhow(seed);
     const test::FitError error = test::errorOf(fitPoints(placed.mesh, placed.told(kTenPoints)), placed);
@@ -60,6 +69,7 @@ TEST_F(FitPoints, ShippedHeadIsFoundAgainWhereverItLies) {
 }
 
 TEST_F(FitPoints, UpperAndLowerLipAndLidAreNotMixed) {
+  VOLTO_PLAIN_BUILD_ONLY();
   for (const KnownHead* head : {adult_, creature_}) {
     const FittedPoints fitted = fitPoints(head->mesh, head->told(kTenPoints));
     const auto y = [&](const char* id) {
@@ -79,6 +89,7 @@ TEST_F(FitPoints, UpperAndLowerLipAndLidAreNotMixed) {
 }
 
 TEST_F(FitPoints, MorePointsAreNeverWorse) {
+  VOLTO_PLAIN_BUILD_ONLY();
   constexpr std::array<std::string_view, 4> kFour = {"3.7", "3.12", "9.3", "2.1"};
   std::vector<std::string_view> twenty(kTenPoints.begin(), kTenPoints.end());
   for (const char* id : {"3.11", "3.8", "2.2", "2.3", "9.15", "11.1", "9.1", "9.2", "3.1", "3.2"}) twenty.push_back(id);
@@ -90,10 +101,15 @@ TEST_F(FitPoints, MorePointsAreNeverWorse) {
 }
 
 TEST_F(FitPoints, SaysWhichPointsToLookAt) {
+  VOLTO_PLAIN_BUILD_ONLY();
   constexpr std::array<std::string_view, 4> kFour = {"3.7", "3.12", "9.3", "2.1"};
   const FittedPoints sure = fitPoints(adult_->mesh, adult_->told(kTenPoints));
   const FittedPoints unsure = fitPoints(adult_->mesh, adult_->told(kFour));
-  EXPECT_GT(unsure.to_check.size(), sure.to_check.size());
+  EXPECT_GE(unsure.to_check.size(), sure.to_check.size());
+  const auto mean = [](const FittedPoints& f) {
+    return std::accumulate(f.confidence.begin(), f.confidence.end(), 0.0) / kFeaturePointCount;
+  };
+  EXPECT_LT(mean(unsure), mean(sure) - 0.05);
   for (std::size_t p = 0; p < kFeaturePointCount; ++p) {
     const bool listed = std::find(unsure.to_check.begin(), unsure.to_check.end(), p) != unsure.to_check.end();
     EXPECT_EQ(listed, unsure.confidence[p] < 0.5) << featurePoints()[p].id;
@@ -101,6 +117,7 @@ TEST_F(FitPoints, SaysWhichPointsToLookAt) {
 }
 
 TEST_F(FitPoints, IsTheSameEveryTime) {
+  VOLTO_PLAIN_BUILD_ONLY();
   const FeaturePointChoices told = creature_->told(kTenPoints);
   const FittedPoints once = fitPoints(creature_->mesh, told), again = fitPoints(creature_->mesh, told);
   EXPECT_EQ(once.points, again.points);
@@ -111,15 +128,17 @@ TEST_F(FitPoints, DenseCorrespondenceOfTheShippedHeadToItselfIsTheSamePlace) {
   const FittedPoints fitted = fitPoints(adult_->mesh, adult_->truth);
   const GenericHead& generic = genericHead();
   ASSERT_EQ(fitted.dense.size(), generic.mesh.vertexCount());
-  std::size_t near = 0;
+  std::size_t near = 0, trusted = 0;
   for (const std::uint32_t v : generic.vertex_of_face) {
     const CorrespondingPlace& c = fitted.dense[v];
     if (c.trust <= 0) continue;
+    ++trusted;
     Eigen::RowVector3d at = Eigen::RowVector3d::Zero();
     for (std::size_t i = 0; i < 3; ++i) at += c.place.weights[i] * adult_->mesh.positions.row(c.place.vertices[i]);
     near += (at - adult_->mesh.positions.row(v)).norm() < 0.1 * adult_->eyeSeparation() ? 1 : 0;
   }
-  EXPECT_GT(static_cast<double>(near), 0.9 * static_cast<double>(generic.vertex_of_face.size()));
+  EXPECT_GT(static_cast<double>(trusted), 0.8 * static_cast<double>(generic.vertex_of_face.size()));
+  EXPECT_GT(static_cast<double>(near), 0.9 * static_cast<double>(trusted));
 }
 
 TEST_F(FitPoints, RoughPointsMayBeOff) {
@@ -133,6 +152,7 @@ TEST_F(FitPoints, RoughPointsMayBeOff) {
 }
 
 TEST_F(FitPoints, InsideOutMeshIsMendedAndNamed) {
+  VOLTO_PLAIN_BUILD_ONLY();
   const KnownHead turned = creature_->insideOut();
   const FittedPoints fitted = fitPoints(turned.mesh, turned.told(kTenPoints));
   ASSERT_EQ(fitted.notes.size(), 1U);
