@@ -90,6 +90,26 @@ void placePoints(const Mesh& mesh, const FeaturePointChoices& choices, Rig& rig)
     }
 }
 
+// One row of the operator and one row of the sparse system for each vertex around the face: 250 000 take about a minute
+// and two gigabytes.
+constexpr std::size_t kMaxMovingVertices = 250'000;
+
+// Before anything is done: how many vertices could move at most.
+void requireSolvable(const Mesh& mesh, const FeaturePointPositions& points, double fade_out) {
+  if (mesh.vertexCount() <= kMaxMovingVertices) return;
+  const Eigen::RowVector3d low = points.colwise().minCoeff().array() - fade_out;
+  const Eigen::RowVector3d high = points.colwise().maxCoeff().array() + fade_out;
+  std::size_t near = 0;
+  for (Eigen::Index v = 0; v < mesh.positions.rows(); ++v)
+    near += (mesh.positions.row(v).array() >= low.array()).all() && (mesh.positions.row(v).array() <= high.array()).all()
+                ? 1U
+                : 0U;
+  if (near > kMaxMovingVertices)
+    throw InputError(std::to_string(near) + " vertices lie around the face, more than the " +
+                     std::to_string(kMaxMovingVertices) +
+                     " that can be rigged; reduce the mesh (its feature points may be given as positions)");
+}
+
 double eyeSeparation(const FeaturePointPositions& points) {
   const auto at = [&](std::string_view id) -> Eigen::Vector3d {
     return points.row(static_cast<Eigen::Index>(pointIndex(id)));
@@ -275,6 +295,7 @@ Rig buildRig(const Mesh& neutral, const FeaturePointChoices& points, const RigOp
         "the corners of both eyes (3.7 3.11, 3.8 3.12) are in one place; the eye separation is what a face is measured "
         "by");
 
+  requireSolvable(neutral, rig.feature_positions, options.fade_out_es * eye_separation);
   try {
     rig.mesh_from_head = meshFromHead(rig.feature_positions);
     rig.fapu = measureFapu(rig.feature_positions * rig.mesh_from_head);  // each row is turned by the inverse

@@ -5,8 +5,8 @@
 
 namespace volto::rig {
 
-// Displacement of `at` (#V by 3): #V by C, when `points` (#M by 3, all different) are displaced by `displacement` (#M by C).
-// Multiquadric with Eck's stiffness (Queiroz, equations 3 to 5) over all points.
+// Displacement of `at` (#V by 3): #V by C, when `points` (#M by 3, all different) are displaced by `displacement` (#M
+// by C). Multiquadric with Eck's stiffness (Queiroz, equations 3 to 5) over all points.
 Eigen::MatrixXd globalMultiquadric(const VertexPositions& points, const Eigen::MatrixXd& displacement,
                                    const VertexPositions& at);
 // Thin-plate spline in space: |r| and an affine part.

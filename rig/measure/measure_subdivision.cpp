@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 #include <exception>
 #include <filesystem>
 #include <fstream>
@@ -18,6 +19,8 @@
 #include "rig/build_rig.h"
 #include "rig/measure/global_splines.h"
 #include "rig/mesh_io.h"
+#include "rig/multiquadric.h"
+#include "rig/rig_health.h"
 
 namespace {
 
@@ -73,6 +76,48 @@ Line measure(const Examples& examples, Eigen::Index counted, const Make& make) {
   return line;
 }
 
+// Jump of displacement where neighbours belong to different triangles of the mask, over all expressions: the rig's, and
+// that of the paper's hard association, where every vertex moves by its own triangle's RBF alone.
+void reportSmoothness(const Rig& rig) {
+  std::vector<std::int16_t> triangle = rig.association.triangle;
+  for (std::size_t v = 0; v < triangle.size(); ++v)
+    if (rig.association.kind[v] != AssociationKind::ray) triangle[v] = -1;
+  std::vector<Multiquadric> rbf(kMaskTriangleCount);
+  const VertexPositions at = rig.feature_positions;
+  for (std::size_t t = 0; t < kMaskTriangleCount; ++t)
+    rbf[t] = Multiquadric(
+        at, std::vector<std::uint16_t>(rig.region_of_influence[t].begin(), rig.region_of_influence[t].end()));
+  std::vector<Eigen::RowVectorXd> weights(triangle.size());
+  for (std::size_t v = 0; v < triangle.size(); ++v)
+    if (triangle[v] >= 0)
+      rbf[static_cast<std::size_t>(triangle[v])].weightsAt(
+          rig.neutral.positions.row(static_cast<Eigen::Index>(v)).transpose(), weights[v]);
+  double ours = 0, hard = 0;
+  int shapes = 0;
+  for (const Blendshape& shape : rig.blendshapes) {
+    if (!shape.moves_mask) continue;
+    const auto motion = [&shape](std::size_t p) {
+      const auto& d = shape.mask_displacement[p];
+      return Eigen::RowVector3d(d[0], d[1], d[2]);
+    };
+    VertexPositions blended = VertexPositions::Zero(rig.neutral.positions.rows(), 3), own = blended;
+    for (std::size_t v = 0; v < triangle.size(); ++v) {
+      const auto row = static_cast<Eigen::Index>(v);
+      for (std::uint32_t e = rig.deformation.row_start[v]; e < rig.deformation.row_start[v + 1]; ++e)
+        blended.row(row) += rig.deformation.weight[e] * motion(rig.deformation.point[e]);
+      if (triangle[v] < 0) continue;
+      const auto points = rbf[static_cast<std::size_t>(triangle[v])].points();
+      for (std::size_t j = 0; j < points.size(); ++j)
+        own.row(row) += weights[v][static_cast<Eigen::Index>(j)] * motion(points[j]);
+    }
+    ours += borderJump(rig.neutral, triangle, blended).relative();
+    hard += borderJump(rig.neutral, triangle, own).relative();
+    ++shapes;
+  }
+  std::printf("jump across borders, relative to the displacement there: %.5f; hard association: %.5f; ratio %.1f\n",
+              ours / shapes, hard / shapes, hard / ours);
+}
+
 int run(int argc, char** argv) {
   const std::filesystem::path folder = argv[1];
   const Mesh neutral = readMesh(folder / "neutral.obj");
@@ -80,9 +125,15 @@ int run(int argc, char** argv) {
   const auto counted = argc > 3 ? static_cast<Eigen::Index>(std::atol(argv[3])) : neutral.positions.rows();
   const Examples examples = readExamples(folder / "expressions", neutral, counted);
   std::printf("%zu expressions, %td vertices counted of %zu\n", examples.names.size(), counted, neutral.vertexCount());
-  std::printf("%-16s %6s %9s %9s %-14s %8s %8s %8s\n", "subdivision", "points", "regions", "worst", "", "global", "thin",
-              "rigging");
+  std::printf("%-16s %6s %9s %9s %-14s %8s %8s %8s\n", "subdivision", "points", "regions", "worst", "", "global",
+              "thin", "rigging");
   std::printf("%-16s %6s %9s %9s %-14s %8s %8s %8s\n", "", "", "", "", "", "multiq.", "plate", "s");
+  const auto start_of_rigging = std::chrono::steady_clock::now();
+  const std::clock_t cpu = std::clock();
+  const Rig plain = buildRig(neutral, points);
+  std::printf("rigging: %.2f s, %.2f s of all processors\n", secondsSince(start_of_rigging),
+              static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC);
+  reportSmoothness(plain);
   const VertexPositions at = neutral.positions.topRows(counted);
   const auto report = [&](const std::string& name, const Subdivision& subdivision) {
     RigOptions options;
