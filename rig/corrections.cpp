@@ -142,11 +142,14 @@ class CorrectionMaker {
     if (!a || !b) return;
     lab_.setWeights(weightsOf({*a, *b}));
     DenseDisplacement extra = lab_.nothing();
-    if (first.starts_with("eyeBlink"))
-      if (const SlitContact* lids =
-              slitAt(first.ends_with("Left") ? SlitContact::Place::left_eye : SlitContact::Place::right_eye))
-        closeWithoutFolds(*lids, extra);
-    lab_.unfold(extra);
+    const SlitContact* lids = !first.starts_with("eyeBlink") ? nullptr
+                              : first.ends_with("Left")      ? slitAt(SlitContact::Place::left_eye)
+                                                             : slitAt(SlitContact::Place::right_eye);
+    if (lids != nullptr) {
+      closeWithoutFolds(*lids, extra);
+    } else {
+      lab_.unfold(extra);
+    }
     Combination combination;
     combination.name = first + " + " + second;
     combination.drivers = {{static_cast<std::uint16_t>(*a), false}, {static_cast<std::uint16_t>(*b), false}};
