@@ -94,7 +94,7 @@ void expectFound(const Head& head, const test::KnownHead& known, unsigned placem
     EXPECT_LT(error.rotation_deg, 10) << "seed " << seed;
     EXPECT_LT(error.scale, 0.12) << "seed " << seed;
     EXPECT_LT(error.mean, head.mean) << "seed " << seed;
-    EXPECT_LT(error.worst, 0.3) << "seed " << seed;
+    EXPECT_LT(error.worst, 0.4) << "seed " << seed;
     EXPECT_GT(face.confidence, 0.8) << "seed " << seed;
     EXPECT_FALSE(face.inside_out) << "seed " << seed;
     EXPECT_NEAR((face.mesh_from_head.transpose() * face.mesh_from_head - Eigen::Matrix3d::Identity()).norm(), 0, 1e-9);
@@ -116,15 +116,15 @@ TEST_P(HeadByOthers, IsFoundHoweverItLies) {
 
 INSTANTIATE_TEST_SUITE_P(
     , HeadByOthers,
-    testing::Values(Head{"ict/person_a.obj", "ict_feature_points.json", 0.075},
-                    Head{"ict/person_b.obj", "ict_feature_points.json", 0.075},
-                    Head{"makehuman/asian-male-old/neutral.obj", "makehuman_feature_points.json", 0.1},
-                    Head{"makehuman/caucasian-female-young/neutral.obj", "makehuman_feature_points.json", 0.075}));
+    testing::Values(Head{"ict/person_a.obj", "ict_feature_points.json", 0.06},
+                    Head{"ict/person_b.obj", "ict_feature_points.json", 0.06},
+                    Head{"makehuman/asian-male-old/neutral.obj", "makehuman_feature_points.json", 0.075},
+                    Head{"makehuman/caucasian-female-young/neutral.obj", "makehuman_feature_points.json", 0.05}));
 
-TEST(ShippedHead, IsFoundHoweverItLies) { expectFound({"volto_head.obj", "", 0.09}, adult(), 2); }
+TEST(ShippedHead, IsFoundHoweverItLies) { expectFound({"volto_head.obj", "", 0.11}, adult(), 2); }
 
 TEST(ShippedCreature, IsFoundThoughItIsNoMan) {
-  expectFound({"volto_creature.obj", "", 0.12},
+  expectFound({"volto_creature.obj", "", 0.14},
               test::KnownHead::read(asset("volto_creature.obj"), asset("volto_creature.points.json")), 1);
 }
 
