@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "capture/v4l2/pixel_kernel.h"
+
 namespace volto::capture::v4l2 {
 
 namespace {
@@ -48,7 +50,10 @@ void yuyvToBgr(std::span<const std::uint8_t> source, int width, int height, std:
   for (int row = 0; row < height; ++row) {
     const std::uint8_t* in = source.data() + static_cast<std::size_t>(row) * stride;
     std::uint8_t* out = bgr.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(width) * 3;
-    for (int x = 0; x + 1 < width; x += 2, in += 4, out += 6) {
+    const auto done = static_cast<int>(yuyvRow(in, static_cast<std::size_t>(width), matrix, out));
+    in += 2 * done;
+    out += 3 * done;
+    for (int x = done; x + 1 < width; x += 2, in += 4, out += 6) {
       const Chroma chroma(in[1], in[3], matrix);
       putPixel(in[0], chroma, matrix, out);
       putPixel(in[2], chroma, matrix, out + 3);
@@ -64,7 +69,11 @@ void nv12ToBgr(std::span<const std::uint8_t> source, int width, int height, std:
     const std::uint8_t* in = source.data() + static_cast<std::size_t>(row) * stride;
     const std::uint8_t* uv = colours + static_cast<std::size_t>(row / 2) * stride;
     std::uint8_t* out = bgr.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(width) * 3;
-    for (int x = 0; x + 1 < width; x += 2, in += 2, uv += 2, out += 6) {
+    const auto done = static_cast<int>(nv12Row(in, uv, static_cast<std::size_t>(width), matrix, out));
+    in += done;
+    uv += done;
+    out += 3 * done;
+    for (int x = done; x + 1 < width; x += 2, in += 2, uv += 2, out += 6) {
       const Chroma chroma(uv[0], uv[1], matrix);
       putPixel(in[0], chroma, matrix, out);
       putPixel(in[1], chroma, matrix, out + 3);
@@ -78,7 +87,8 @@ void greyToBgr(std::span<const std::uint8_t> source, int width, int height, std:
   for (int row = 0; row < height; ++row) {
     const std::uint8_t* const in = source.data() + static_cast<std::size_t>(row) * stride;
     std::uint8_t* const out = bgr.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(width) * 3;
-    for (int x = 0; x < width; ++x) out[3 * x] = out[3 * x + 1] = out[3 * x + 2] = in[x];
+    const auto done = static_cast<int>(greyRow(in, static_cast<std::size_t>(width), out));
+    for (int x = done; x < width; ++x) out[3 * x] = out[3 * x + 1] = out[3 * x + 2] = in[x];
   }
 }
 
