@@ -30,6 +30,22 @@ std::vector<Edge> openEdges(const Mesh& mesh, std::span<const std::uint32_t> sam
   return open;
 }
 
+// A number for each connected piece, per vertex that stands for itself.
+std::vector<std::uint32_t> pieces(const Mesh& mesh, std::span<const std::uint32_t> same_as) {
+  std::vector<std::uint32_t> parent(same_as.begin(), same_as.end());
+  const auto root = [&parent](std::uint32_t v) {
+    while (parent[v] != v) v = parent[v] = parent[parent[v]];
+    return v;
+  };
+  for (std::size_t p = 0; p < mesh.polygonCount(); ++p) {
+    const std::uint32_t first = root(mesh.corner_vertices[mesh.polygon_start[p]]);
+    for (std::uint32_t c = mesh.polygon_start[p] + 1; c < mesh.polygon_start[p + 1]; ++c)
+      parent[root(mesh.corner_vertices[c])] = first;
+  }
+  for (std::uint32_t v = 0; v < parent.size(); ++v) parent[v] = root(v);
+  return parent;
+}
+
 }  // namespace
 
 std::vector<TVertex> findTVertices(const Mesh& mesh, std::span<const std::uint32_t> same_as, std::span<const Slit> slits) {
@@ -40,6 +56,7 @@ std::vector<TVertex> findTVertices(const Mesh& mesh, std::span<const std::uint32
   std::sort(by_x.begin(), by_x.end());
   by_x.erase(std::unique(by_x.begin(), by_x.end()), by_x.end());
   const double tolerance = 1e-5 * (mesh.positions.colwise().maxCoeff() - mesh.positions.colwise().minCoeff()).norm();
+  const std::vector<std::uint32_t> piece = pieces(mesh, same_as);
   std::vector<TVertex> found;
   for (const auto& [a, b] : edges) {
     const Eigen::Vector3d from = mesh.positions.row(a), along = mesh.positions.row(b).transpose() - from;
@@ -50,7 +67,7 @@ std::vector<TVertex> findTVertices(const Mesh& mesh, std::span<const std::uint32
     for (auto at = std::lower_bound(by_x.begin(), by_x.end(), std::pair{low - tolerance, 0U});
          at != by_x.end() && at->first <= high + tolerance; ++at) {
       const std::uint32_t v = at->second;
-      if (v == a || v == b) continue;
+      if (v == a || v == b || piece[v] != piece[a]) continue;  // a lash that touches a lid is no part of it
       const Eigen::Vector3d to = mesh.positions.row(v).transpose() - from;
       const double share = to.dot(along) / length2;
       const double margin = 2 * tolerance / std::sqrt(length2);

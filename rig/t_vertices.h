@@ -17,8 +17,8 @@ struct TVertex {
   double share;        // of b: the vertex lies at (1 - share) a + share b
 };
 
-// Among the vertices that stand for themselves (rig/weld.h), on edges that only one polygon has, except along slits;
-// within 1e-5 of the mesh's size. Ascending by edge and share.
+// Among the vertices that stand for themselves (rig/weld.h), on edges of the same connected piece that only one polygon
+// has, except along slits; within 1e-5 of the mesh's size. Ascending by edge and share.
 std::vector<TVertex> findTVertices(const Mesh& mesh, std::span<const std::uint32_t> same_as, std::span<const Slit> slits);
 
 // The mesh whose polygons have these vertices as corners of their own: the same surface, joined. Positions, texture
