@@ -217,7 +217,7 @@ void Preview::look(const LiveFrame& frame) {
   }
   if (!s.options.sheet.empty() && s.frames++ % s.spacing == 0) {
     if (s.moments.size() == 2 * s.options.moments) {
-      for (std::size_t i = 0; i < s.options.moments; ++i) s.moments[i] = std::move(s.moments[2 * i]);
+      for (std::size_t i = 1; i < s.options.moments; ++i) s.moments[i] = std::move(s.moments[2 * i]);
       s.moments.resize(s.options.moments);
       s.spacing *= 2;
     }
