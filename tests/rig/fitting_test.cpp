@@ -157,7 +157,9 @@ TEST_F(FitPoints, InsideOutMeshIsMendedAndNamed) {
   const FittedPoints fitted = fitPoints(turned.mesh, turned.told(kTenPoints));
   ASSERT_EQ(fitted.notes.size(), 1U);
   EXPECT_NE(fitted.notes[0].find("inside out"), std::string::npos) << fitted.notes[0];
-  EXPECT_EQ(fitted.points, fitPoints(creature_->mesh, creature_->told(kTenPoints)).points);
+  // Quads are cut along their other diagonal, so not to the bit.
+  const FittedPoints straight = fitPoints(creature_->mesh, creature_->told(kTenPoints));
+  EXPECT_LT((fitted.positions - straight.positions).rowwise().norm().maxCoeff(), 0.02 * creature_->eyeSeparation());
 }
 
 TEST_F(FitPoints, MirroredGeometryIsMendedAndNamed) {
