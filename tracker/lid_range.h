@@ -13,6 +13,7 @@ class LidCalibration {
   // Known from earlier; a range that is empty means nothing is known.
   void start(const LidRange& range);
   const LidRange& range() const { return range_; }
+  bool known() const { return known_; }  // a blink has been seen
 
   // `blink`: the eyeBlink weight as fitted. Returns it as a share of the range, 0..1.
   float push(float blink, double dt_s);
@@ -21,7 +22,7 @@ class LidCalibration {
   void learn(float blink, double dt_s);
 
   LidRange range_{};
-  bool known_ = false;  // a blink has been seen
+  bool known_ = false;
   // The blink that is under way.
   bool closing_ = false;
   float peak_ = 0;

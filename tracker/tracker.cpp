@@ -246,6 +246,8 @@ void Tracker::State::measure(const LandmarkFrame& in, double dt_s, MaskFrame& ou
     out.arkit_weights[k] = p.shows()[k] ? static_cast<float>(weights[static_cast<Eigen::Index>(k)]) : 0.0F;
   if (options.from_pixels) {
     for (std::size_t eye = 0; eye < 2; ++eye) {
+      // The eyes of one face are alike to a detector: what one has shown first holds for both.
+      if (!lids[eye].known() && lids[1 - eye].known()) lids[eye].start(lids[1 - eye].range());
       float& blink = out.arkit_weights[eyeBlinkIndex(eye)];
       blink = lids[eye].push(blink, dt_s);
     }
