@@ -5,10 +5,13 @@
 #include <iterator>
 #include <map>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
+#include "retarget/face_deformer.h"
 #include "rig/build_rig.h"
 #include "rig/mesh_io.h"
 #include "tests/support/test_data.h"
@@ -27,18 +30,27 @@ class HeadRig : public ::testing::TestWithParam<const char*> {
     const std::string json{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
     return made[name] = buildRig(readMesh(folder / (name + ".obj")), parseFeaturePoints(json, name + ".points.json"));
   }
+  // The character with these shapes at full weight, as every program deforms it.
+  static const std::vector<retarget::Vertex>& posed(std::initializer_list<std::string_view> shapes) {
+    static std::map<std::string, std::vector<retarget::Vertex>> made;
+    static std::map<std::string, retarget::FaceDeformer> deformers;
+    std::string key = GetParam();
+    std::vector<std::pair<std::string_view, float>> weights;
+    for (const std::string_view shape : shapes) {
+      key += ' ' + std::string(shape);
+      weights.emplace_back(shape, 1.0F);
+    }
+    if (const auto it = made.find(key); it != made.end()) return it->second;
+    const auto [deformer, is_new] = deformers.try_emplace(GetParam(), rig());
+    std::vector<retarget::Vertex>& out = made[key];
+    out.resize(rig().neutral.vertexCount());
+    deformer->second.deformAtWeights(retarget::weightsByName(rig(), weights), out);
+    return out;
+  }
   // Where a vertex is with these shapes at full weight.
   static Eigen::Vector3d moved(std::size_t v, std::initializer_list<std::string_view> shapes) {
-    Eigen::Vector3d p = rig().neutral.positions.row(static_cast<Eigen::Index>(v)).transpose();
-    for (const Blendshape& shape : rig().blendshapes) {
-      if (std::find(shapes.begin(), shapes.end(), shape.name) == shapes.end()) continue;
-      const DeformationOperator& op = rig().deformation;
-      for (std::size_t k = op.row_start[v]; k < op.row_start[v + 1]; ++k)
-        for (int axis = 0; axis < 3; ++axis)
-          p[axis] += static_cast<double>(op.weight[k]) *
-                     static_cast<double>(shape.mask_displacement[op.point[k]][static_cast<std::size_t>(axis)]);
-    }
-    return p;
+    const retarget::Vertex& at = posed(shapes)[v];
+    return {at[0], at[1], at[2]};
   }
   static std::size_t vertexOf(std::string_view id) {
     return static_cast<std::size_t>(rig().feature_vertex[featurePointIndex(id).value()]);
@@ -111,18 +123,13 @@ TEST_P(HeadRig, JawOpenPartsTheLipsAndTakesTheLowerTeethAlong) {
 // A triangle has flipped when it faces away from where it faced at rest.
 TEST_P(HeadRig, FewTrianglesFlipOverThe52Shapes) {
   const Mesh& mesh = rig().neutral;
-  const DeformationOperator& op = rig().deformation;
   const Eigen::MatrixXd rest = mesh.positions.cast<double>();
   std::size_t triangles = 0, flipped = 0, worst = 0, outside_lids_and_lips = 0;
   std::string worst_shape;
   for (const Blendshape& shape : rig().blendshapes) {
-    Eigen::MatrixXd at = rest;
+    Eigen::MatrixXd at(rest.rows(), 3);
     for (std::size_t v = 0; v < mesh.vertexCount(); ++v)
-      for (std::size_t k = op.row_start[v]; k < op.row_start[v + 1]; ++k)
-        for (int axis = 0; axis < 3; ++axis)
-          at(static_cast<Eigen::Index>(v), axis) +=
-              static_cast<double>(op.weight[k]) *
-              static_cast<double>(shape.mask_displacement[op.point[k]][static_cast<std::size_t>(axis)]);
+      at.row(static_cast<Eigen::Index>(v)) = moved(v, {shape.name}).transpose();
     std::size_t here = 0;
     for (std::size_t p = 0; p < mesh.polygonCount(); ++p) {
       const std::string& material = mesh.materials[mesh.polygon_material[p]].name;
