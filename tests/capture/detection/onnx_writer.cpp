@@ -68,9 +68,14 @@ std::string makeOnnx(int width, int height, const std::vector<OnnxOutput>& outpu
     const int count = static_cast<int>(output.constant.size());
     std::vector<float> matrix = output.per_colour;
     if (matrix.empty()) matrix.assign(3 * output.constant.size(), 0.0F);
-    graph.message(1, node("Gemm", {"colour", output.name + "_m", output.name + "_c"}, output.name + "_flat"));
+    // Transposed, and said so: OpenCV 4.6 takes a matrix without the attribute to be transposed.
+    std::vector<float> transposed(matrix.size());
+    for (std::size_t n = 0; n < output.constant.size(); ++n)
+      for (std::size_t c = 0; c < 3; ++c) transposed[3 * n + c] = matrix[c * output.constant.size() + n];
+    graph.message(1, node("Gemm", {"colour", output.name + "_m", output.name + "_c"}, output.name + "_flat")
+                         .message(5, Message().bytes(1, "transB").number(3, 1).number(20, 2)));
     graph.message(1, node("Reshape", {output.name + "_flat", output.name + "_shape"}, output.name));
-    graph.message(5, tensor(output.name + "_m", {3, count}, kFloat, rawBytes(matrix)));
+    graph.message(5, tensor(output.name + "_m", {count, 3}, kFloat, rawBytes(transposed)));
     graph.message(5, tensor(output.name + "_c", {count}, kFloat, rawBytes(output.constant)));
     const std::vector<std::int64_t> shape(output.shape.begin(), output.shape.end());
     graph.message(5, tensor(output.name + "_shape", {static_cast<int>(shape.size())}, kInt64, rawBytes(shape)));
