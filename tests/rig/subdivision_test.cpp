@@ -52,12 +52,14 @@ class RefinedHead : public testing::Test {
   std::size_t on_mask_ = head_.skirt[0][1];  // the skirt's vertices come after the mask's
 };
 
-TEST_F(RefinedHead, OnceIs220PointsAndTwiceIs628) {
+TEST_F(RefinedHead, OnceIs220PointsAndTwiceAbout628) {
   const Rig once = rigged(head_, levels(1)), twice = rigged(head_, levels(2));
   EXPECT_EQ(once.refined.pointCount(), 220U);
   EXPECT_EQ(once.refined.triangles.size(), 408U);
-  EXPECT_EQ(twice.refined.pointCount(), 628U);
-  EXPECT_EQ(twice.refined.triangles.size(), 1224U);
+  // A triangle without a vertex well inside stays whole.
+  EXPECT_LE(twice.refined.pointCount(), 628U);
+  EXPECT_GE(twice.refined.pointCount(), 620U);
+  EXPECT_EQ(twice.refined.triangles.size(), 136 + 2 * (twice.refined.pointCount() - 84));
   EXPECT_TRUE(rigged(head_, {}).refined.empty());
 }
 
