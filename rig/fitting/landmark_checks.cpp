@@ -67,7 +67,7 @@ FacePlacement placeFace(std::vector<PlacedLandmark>& landmarks, const FeaturePoi
                         const FeaturePointPositions& generic_normals, bool inside_out) {
   if (landmarks.size() < kFewestPoints) {
     std::string ten;
-    for (const std::string_view id : kTenPoints) ten += " " + std::string(id);
+    for (const std::string_view id : kTenPoints) ten.append(1, ' ').append(id);
     throw InputError("only " + std::to_string(landmarks.size()) + " feature points are given; at least " +
                      std::to_string(kFewestPoints) + " are needed to fit a face, ten are good:" + ten);
   }
