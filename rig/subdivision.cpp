@@ -11,9 +11,6 @@
 namespace volto::rig {
 namespace {
 
-// The automatic choice looks again at what is still bad after so many parts of its points.
-constexpr std::size_t kRounds = 16;
-
 class Subdivider {
  public:
   Subdivider(const SkinProblem& problem, MaskOnSkin mask) : problem_(problem), mask_(std::move(mask)) {
@@ -109,8 +106,8 @@ class Subdivider {
   std::vector<std::vector<std::uint32_t>> inside_;   // per triangle: the vertices associated with it
 };
 
-// How much a point in each triangle would mend: between the error of all its vertices, which may lie where the new point
-// does not reach, and that of the new point's own vertex, which may be an exception. Zero where none can be added.
+// What a point in each triangle might mend: the error of all its vertices. Zero where no point can be added. (Weighing
+// in the error at the new point's own vertex was tried: worse.)
 std::vector<double> gainByTriangle(const SkinProblem& problem, const Subdivider& subdivider, const Columns& examples,
                                     const Eigen::RowVectorXd& size2) {
   const MaskOnSkin& mask = subdivider.mask();
@@ -126,11 +123,8 @@ std::vector<double> gainByTriangle(const SkinProblem& problem, const Subdivider&
   };
   std::vector<double> gain(subdivider.triangleCount(), 0.0);
   for (std::size_t t = 0; t < gain.size(); ++t) {
-    const std::int64_t centre = subdivider.centre(t);
-    if (centre < 0) continue;
-    double all = 0;
-    for (const std::uint32_t v : subdivider.verticesOf(t)) all += errorAt(v);
-    gain[t] = std::sqrt(all * errorAt(centre) * static_cast<double>(subdivider.verticesOf(t).size()));
+    if (subdivider.centre(t) < 0) continue;
+    for (const std::uint32_t v : subdivider.verticesOf(t)) gain[t] += errorAt(v);
   }
   return gain;
 }
@@ -156,7 +150,7 @@ void subdivideAutomatically(const SkinProblem& problem, Subdivider& subdivider, 
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return gain[a] > gain[b]; });
     const std::size_t before = added;
-    const std::size_t round = std::min(budget - added, std::max<std::size_t>(4, budget / kRounds));
+    const std::size_t round = std::min(budget - added, std::max<std::size_t>({8, budget / 8, added / 4}));
     for (const std::size_t t : order) {
       if (added - before == round || !(gain[t] > 0)) break;
       subdivider.splitAt(static_cast<std::uint32_t>(subdivider.centre(t)));
