@@ -46,7 +46,7 @@ struct TrackerOptions {
   bool use_3d = true;          // false: 2D points only, even where the input has 3D
   double focal_length_px = 0;  // 0: as the input says, else guessed from the image size
   double smoothing = 1.0;      // 0: no filter; more = smoother and later. Scales all regions.
-  RegionSmoothing regions;
+  RegionSmoothing regions{};
   double hold_s = 0.2;         // a lost face: the last good expression is held so long ...
   double ease_s = 0.5;         // ... and then led back to neutral in so long
   // The landmarks come from a detector that looked at pixels (tracker/detector_noise.h): what people usually do counts

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <variant>
 
 #include <Eigen/Geometry>
@@ -208,6 +209,53 @@ FeaturePointChoice choiceFor(std::size_t p, const TargetSurface& target, const S
   return Eigen::Vector3d(frame(hit.position));
 }
 
+// Where lips or lids touch, the nearest surface may be the opposite one. A point that came out on the wrong side of the
+// one it faces is read off again, nearest surface first, and put directly beside the other when that is wrong too.
+void keepSidesApart(const RegisteredFace& face, const GenericHead& head, const TargetSurface& target,
+                    const Similarity& frame, const VertexPositions& normals, const FeaturePointChoices& given,
+                    std::vector<bool>& vertex_taken, FittedPoints& out) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kFacing = {{{"2.2", "2.3"},
+                                                                                     {"2.6", "2.8"},
+                                                                                     {"2.7", "2.9"},
+                                                                                     {"3.1", "3.3"},
+                                                                                     {"3.2", "3.4"},
+                                                                                     {"12.5", "12.7"},
+                                                                                     {"12.6", "12.8"},
+                                                                                     {"12.9", "12.11"},
+                                                                                     {"12.10", "12.12"}}};
+  constexpr double kBeside = 0.002;  // eye separations
+  const auto placeNow = [&](std::size_t p) {
+    const FeaturePointChoice& choice = out.points.at(p);
+    if (const auto* vertex = std::get_if<std::uint32_t>(&choice))
+      return Eigen::Vector3d(target.positions().row(*vertex));
+    return Eigen::Vector3d(frame.inverse(std::get<Eigen::Vector3d>(choice)));
+  };
+  for (const auto& [upper_id, lower_id] : kFacing) {
+    const std::size_t upper = featurePointIndex(upper_id).value(), lower = featurePointIndex(lower_id).value();
+    const Eigen::Vector3d upper_at = placeNow(upper), lower_at = placeNow(lower);
+    if (upper_at.y() >= lower_at.y() || (given.contains(upper) && given.contains(lower))) continue;
+    const auto off = [&](std::size_t p, const Eigen::Vector3d& at) {
+      return (at - placeOn(face.positions, head.points[p])).norm();
+    };
+    const bool lower_is_wrong =
+        !given.contains(lower) && (given.contains(upper) || off(lower, lower_at) > off(upper, upper_at));
+    const std::size_t wrong = lower_is_wrong ? lower : upper;
+    const Eigen::Vector3d& right_at = lower_is_wrong ? upper_at : lower_at;
+    const double side = lower_is_wrong ? -1 : 1;
+    const SurfaceHit hit =
+        target.find(placeOn(face.positions, head.points[wrong]), placeOn(normals, head.points[wrong]).normalized(), -2,
+                    std::numeric_limits<double>::infinity());
+    FeaturePointChoice choice = choiceFor(wrong, target, hit, frame, vertex_taken);
+    out.points[wrong] = choice;
+    if (side * (placeNow(wrong).y() - right_at.y()) <= 0)
+      out.points[wrong] = Eigen::Vector3d(frame(right_at + Eigen::Vector3d(0, side * kBeside, 0)));
+    out.confidence[wrong] /= 2;
+    if (out.confidence[wrong] < kDoubtful &&
+        std::find(out.to_check.begin(), out.to_check.end(), wrong) == out.to_check.end())
+      out.to_check.push_back(wrong);
+  }
+}
+
 std::vector<CorrespondingPlace> denseCorrespondence(const GenericHead& head, const VertexPositions& start,
                                                     const LandmarkWarp& warp, const RegisteredFace& face,
                                                     const TargetSurface& target, const TargetSurface& all_skin) {
@@ -301,6 +349,7 @@ FittedPoints fitPoints(const Mesh& mesh, const FeaturePointChoices& given, std::
     out.confidence[p] = 1 / (1 + error2 / (kHalfConfidence_es * kHalfConfidence_es));
     if (out.confidence[p] < kDoubtful) out.to_check.push_back(p);
   }
+  keepSidesApart(face, head, target, frame, normals, given, vertex_taken, out);
   for (const auto& [p, choice] : out.points) {
     const auto* vertex = std::get_if<std::uint32_t>(&choice);
     out.positions.row(static_cast<Eigen::Index>(p)) =

@@ -52,7 +52,7 @@ TEST_F(Inspect, APictureShowsTheMaskTheRegionsAndTheWorstExpression) {
   const std::string png = readFile(path("health.png"));
   EXPECT_EQ(png.substr(1, 3), "PNG");
   EXPECT_GT(png.size(), 50'000U);
-  expectRefused(volto({"inspect", headMesh(), "--picture", output("other.png")}), 65, "inspect", "shows a rig");
+  expectRefused(volto({"inspect", headMesh(), "--picture", output("other.png")}), 65, "inspect", "show a rig");
 }
 
 TEST_F(Inspect, RigTellsItsHealth) {

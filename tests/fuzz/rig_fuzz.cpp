@@ -43,7 +43,10 @@ std::vector<std::byte> smallRig() {
   }
   FeaturePointChoices points;
   for (std::size_t i = 0; i < kFeaturePointCount; ++i) points[i] = static_cast<std::uint32_t>(i);
-  Rig rig = buildRig(mesh, points, {.name = "mask", .mesh_file = "mask.obj"});
+  RigOptions options;
+  options.name = "mask";
+  options.mesh_file = "mask.obj";
+  Rig rig = buildRig(mesh, points, options);
   rig.blendshapes.resize(2);  // small, so that a change hits something
   return encodeRig(rig);
 }

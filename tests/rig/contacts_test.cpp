@@ -97,7 +97,9 @@ TEST(Contacts, ContactBeginsWithoutAJump) {
     auto pose = eye.neutral;
     pose[0][1] -= 1.6F * static_cast<float>(i) / 400;
     const auto out = eye.resolved(pose);
-    if (i > 0) EXPECT_LT(std::hypot(out[0][1] - before[1], out[0][2] - before[2]), 0.02F) << i;
+    if (i > 0) {
+      EXPECT_LT(std::hypot(out[0][1] - before[1], out[0][2] - before[2]), 0.02F) << i;
+    }
     before = out[0];
   }
 }

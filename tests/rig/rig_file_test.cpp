@@ -19,7 +19,10 @@ class RigFile : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     const test::TestHead head = test::makeTestHead({.subdivisions = 1, .parts = true});
-    rig_ = new Rig(buildRig(head.mesh, head.points, {.name = "Anna", .mesh_file = "anna.obj"}));
+    RigOptions options;
+    options.name = "Anna";
+    options.mesh_file = "anna.obj";
+    rig_ = new Rig(buildRig(head.mesh, head.points, options));
     rig_->neutral.materials = {{"skin", {0.9F, 0.7F, 0.6F}}, {"eye", {1, 1, 1}}};
     rig_->neutral.polygon_material.assign(rig_->neutral.polygonCount(), 1);
     rig_->neutral.corner_texcoords.assign(rig_->neutral.corner_vertices.size(), {0.25F, 0.75F});

@@ -163,7 +163,9 @@ class LiveVideo : public LiveTest {
   }
   std::vector<LandmarkFrame> record(const std::filesystem::path& data, const std::string& name) {
     {
-      protocol::TakeWriter take((dir / name).string(), {.name = name});
+      protocol::TakeHeader header;
+      header.name = name;
+      protocol::TakeWriter take((dir / name).string(), header);
       LiveOptions options;
       options.every_frame = true;
       Live live(rig, open(data), publisher, options, &take);

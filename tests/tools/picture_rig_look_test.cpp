@@ -15,13 +15,14 @@
 namespace volto::picture {
 namespace {
 
-// Volto's own head, as if its file named no materials.
+// Volto's own head, as if its file knew no colours.
 const rig::Rig& bareHead() {
   static const rig::Rig head = [] {
     const auto assets = test::sourceDir() / "rig/assets";
     rig::Mesh mesh = rig::readMesh(assets / "volto_head.obj");
     mesh.materials.clear();
     mesh.polygon_material.clear();
+    mesh.vertex_colours.clear();
     std::ifstream file(assets / "volto_head.points.json");
     const std::string json((std::istreambuf_iterator<char>(file)), {});
     return rig::buildRig(mesh, rig::parseFeaturePoints(json, "volto_head.points.json"));
@@ -59,6 +60,7 @@ TEST(RigLook, EyesLookOutOfTheFace) {
 TEST(RigLook, MaterialsOfTheFileAreKept) {
   rig::Rig head;
   head.neutral = rig::readMesh(test::sourceDir() / "rig/assets/volto_head.obj");
+  head.neutral.vertex_colours.clear();
   head.neutral.materials.resize(1);
   head.neutral.materials[0] = {"skin", {0.2F, 0.3F, 0.4F}};
   head.neutral.polygon_material.assign(head.neutral.polygonCount(), 0);
