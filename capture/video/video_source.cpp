@@ -127,20 +127,23 @@ class VideoSource final : public ImageSource {
 
  private:
   void open() {
-    AVDictionary* wishes = nullptr;
-    av_dict_set(&wishes, "protocol_whitelist", "file", 0);  // a playlist must not fetch anything
+    struct Wishes {
+      AVDictionary* all = nullptr;
+      ~Wishes() { av_dict_free(&all); }
+    } wishes;
+    av_dict_set(&wishes.all, "protocol_whitelist", "file", 0);  // a playlist must not fetch anything
     std::string name = path_;
     std::error_code error;
     const bool folder = std::filesystem::is_directory(path_, error);
     const bool pattern = !folder && path_.find('%') != std::string::npos && !std::filesystem::exists(path_, error);
     if (folder) {
       name = patternOf(path_).string();
-      av_dict_set(&wishes, "pattern_type", "glob", 0);
+      av_dict_set(&wishes.all, "pattern_type", "glob", 0);
     }
     if (folder || pattern) {
       char rate[32];
       std::snprintf(rate, sizeof rate, "%.6g", options_.sequence_rate_hz);
-      av_dict_set(&wishes, "framerate", rate, 0);
+      av_dict_set(&wishes.all, "framerate", rate, 0);
     } else {
       std::FILE* const file = std::fopen(path_.c_str(), "rb");
       if (file == nullptr) throw std::system_error(errno, std::generic_category(), path_);
@@ -149,8 +152,7 @@ class VideoSource final : public ImageSource {
     const AVInputFormat* const images = folder || pattern ? av_find_input_format("image2") : nullptr;
     AVFormatContext* format = nullptr;
     if (!folder && !pattern) name.insert(0, "file:");  // whatever it is called, it is a file
-    const int opened = avformat_open_input(&format, name.c_str(), images, &wishes);
-    av_dict_free(&wishes);
+    const int opened = avformat_open_input(&format, name.c_str(), images, &wishes.all);
     if (opened < 0) {
       throw InputError(path_ + ": is no video that can be read (" + reasonOf(opened) +
                        "); give a video, an animated GIF, an image or an image sequence (frames/%04d.png)");

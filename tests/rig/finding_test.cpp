@@ -1,5 +1,6 @@
 // A face found on a mesh told nothing, and what is no face refused.
 #include <algorithm>
+#include <cctype>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -119,7 +120,12 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(Head{"ict/person_a.obj", "ict_feature_points.json", 0.06},
                     Head{"ict/person_b.obj", "ict_feature_points.json", 0.06},
                     Head{"makehuman/asian-male-old/neutral.obj", "makehuman_feature_points.json", 0.075},
-                    Head{"makehuman/caucasian-female-young/neutral.obj", "makehuman_feature_points.json", 0.05}));
+                    Head{"makehuman/caucasian-female-young/neutral.obj", "makehuman_feature_points.json", 0.05}),
+    [](const testing::TestParamInfo<Head>& info) {
+      std::string name(info.param.mesh);
+      std::replace_if(name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) == 0; }, '_');
+      return name;
+    });
 
 TEST(ShippedHead, IsFoundHoweverItLies) { expectFound({"volto_head.obj", "", 0.11}, adult(), 2); }
 
