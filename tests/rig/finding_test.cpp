@@ -121,8 +121,8 @@ INSTANTIATE_TEST_SUITE_P(
                     Head{"ict/person_b.obj", "ict_feature_points.json", 0.06},
                     Head{"makehuman/asian-male-old/neutral.obj", "makehuman_feature_points.json", 0.075},
                     Head{"makehuman/caucasian-female-young/neutral.obj", "makehuman_feature_points.json", 0.05}),
-    [](const testing::TestParamInfo<Head>& info) {
-      std::string name(info.param.mesh);
+    [](const testing::TestParamInfo<Head>& head) {
+      std::string name(head.param.mesh);
       std::replace_if(name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) == 0; }, '_');
       return name;
     });
