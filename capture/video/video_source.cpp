@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <thread>
 #include <vector>
@@ -151,7 +152,10 @@ class VideoSource final : public ImageSource {
     }
     const AVInputFormat* const images = folder || pattern ? av_find_input_format("image2") : nullptr;
     AVFormatContext* format = nullptr;
-    if (!folder && !pattern) name.insert(0, "file:");  // whatever it is called, it is a file
+    if (!folder && !pattern) {
+      name.insert(0, "file:");  // whatever it is called, it is a file
+      refuseLists(name);
+    }
     const int opened = avformat_open_input(&format, name.c_str(), images, &wishes.all);
     if (opened < 0) {
       throw InputError(path_ + ": is no video that can be read (" + reasonOf(opened) +
@@ -186,6 +190,19 @@ class VideoSource final : public ImageSource {
     step_ns_ = std::clamp<std::int64_t>(std::llround(1e9 / info_.rate_hz), 1'000'000, 10'000'000'000);
     announced_ = stream.nb_frames;
     turn_ = quarterTurns(stream);
+  }
+
+  // Playlists open other files, or ask for them again and again without end.
+  void refuseLists(const std::string& url) const {
+    AVIOContext* bytes = nullptr;
+    if (avio_open2(&bytes, url.c_str(), AVIO_FLAG_READ, nullptr, nullptr) < 0) return;  // said where it is opened
+    const AVInputFormat* kind = nullptr;
+    const int probed = av_probe_input_buffer2(bytes, &kind, url.c_str(), nullptr, 0, 0);
+    avio_closep(&bytes);
+    if (probed < 0 || kind == nullptr) return;
+    constexpr std::array<std::string_view, 7> kLists = {"hls", "dash", "webm_dash_manifest", "concat", "imf", "sdp", "rtsp"};
+    if (std::find(kLists.begin(), kLists.end(), kind->name) != kLists.end())
+      throw InputError(path_ + ": is a list of other files (" + kind->name + "), not a video; give the video itself");
   }
 
   static int quarterTurns(const AVStream& stream) {
