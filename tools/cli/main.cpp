@@ -33,6 +33,7 @@ constexpr Verb kVerbs[] = {
     {"inspect", "say what a rig, take, mesh or CSV file holds and how healthy it is", defineInspect},
     {"cameras", "list the cameras and what they can do; try one", defineCameras},
     {"doctor", "say which models are there, which are missing and how to get them", defineDoctor},
+    {"transfer", "one character's expressions on another's face", defineTransfer},
     {"evaluate", "compare a set of expression meshes with what it should be", defineEvaluate},
 };
 

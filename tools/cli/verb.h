@@ -30,6 +30,7 @@ RunVerb defineTrack(CLI::App& app);
 RunVerb defineInspect(CLI::App& app);
 RunVerb defineCameras(CLI::App& app);
 RunVerb defineDoctor(CLI::App& app);
+RunVerb defineTransfer(CLI::App& app);
 RunVerb defineEvaluate(CLI::App& app);
 
 // In the order a person meets them.

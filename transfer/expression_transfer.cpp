@@ -1,0 +1,197 @@
+#include "transfer/expression_transfer.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+
+#include "rig/contacts.h"
+#include "rig/parallel.h"
+#include "rig/weld.h"
+#include "transfer/correspondence.h"
+#include "transfer/mask_transfer.h"
+#include "transfer/part_transfer.h"
+
+namespace volto::transfer {
+namespace {
+
+using Triangle = std::array<std::uint32_t, 3>;
+using Float3 = std::array<float, 3>;
+
+std::vector<Float3> toFloat(const rig::VertexPositions& p) {
+  std::vector<Float3> out(static_cast<std::size_t>(p.rows()));
+  for (std::size_t v = 0; v < out.size(); ++v)
+    for (std::size_t k = 0; k < 3; ++k)
+      out[v][k] = static_cast<float>(p(static_cast<Eigen::Index>(v), static_cast<Eigen::Index>(k)));
+  return out;
+}
+
+// What resolveContacts moves, in double precision.
+rig::VertexPositions outOfContact(const rig::Contacts& contacts, const std::vector<Float3>& neutral,
+                                  const rig::VertexPositions& positions) {
+  const std::vector<Float3> before = toFloat(positions);
+  std::vector<Float3> after = before;
+  rig::resolveContacts(contacts, neutral, after);
+  rig::VertexPositions moved(positions.rows(), 3);
+  for (std::size_t v = 0; v < after.size(); ++v)
+    for (std::size_t k = 0; k < 3; ++k)
+      moved(static_cast<Eigen::Index>(v), static_cast<Eigen::Index>(k)) =
+          static_cast<double>(after[v][k]) - static_cast<double>(before[v][k]);
+  return moved;
+}
+
+bool isNone(const SurfacePoint& p) { return p.weight[0] == 0 && p.weight[1] == 0 && p.weight[2] == 0; }
+
+// Per vertex of the target: FAPU ratio along the head's axes, as the mask's points that move the vertex have it.
+std::vector<Eigen::Vector3d> ratioOfVertices(const rig::Rig& source, const rig::Rig& target) {
+  const rig::RefinedMask mask = drivingMask(target);
+  const std::vector<MaskPlace> places = placesOf(mask);
+  std::vector<Eigen::Vector3d> at_point;
+  for (const MaskPlace& place : places) at_point.push_back(fapuRatio(source, target, place));
+  const double size = target.fapu.fapu.eye_separation / source.fapu.fapu.eye_separation;
+  std::vector<Eigen::Vector3d> out(target.neutral.vertexCount(), Eigen::Vector3d::Constant(size));
+  for (std::size_t v = 0; v < out.size(); ++v) {
+    const auto points = mask.to_vertices.points(v);
+    const auto weights = mask.to_vertices.weights(v);
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    double total = 0;
+    for (std::size_t e = 0; e < points.size(); ++e) {
+      const double w = std::abs(static_cast<double>(weights[e]));
+      sum += w * at_point[points[e]];
+      total += w;
+    }
+    if (total > 0) out[v] = sum / total;
+  }
+  return out;
+}
+
+std::vector<std::uint32_t> weldOf(const rig::Rig& rig) {
+  // Seams of texture coordinates alone: lips and lids that touch at rest are slits.
+  std::vector<rig::Slit> slits;
+  for (const rig::SlitContact& contact : rig.contacts.slits) {
+    rig::Slit slit;
+    for (std::size_t k = 0; k < contact.upper.size(); ++k) {
+      const auto at = [&](const rig::SlitContact::Sample& s) -> Eigen::Vector3d {
+        return (1 - s.share_of_second) * rig.neutral.positions.row(s.first) +
+               s.share_of_second * rig.neutral.positions.row(s.second);
+      };
+      slit.upper.push_back(at(contact.upper[k]));
+      slit.lower.push_back(at(contact.lower[k]));
+    }
+    slits.push_back(std::move(slit));
+  }
+  return rig::weldSeams(rig.neutral, slits);
+}
+
+}  // namespace
+
+struct ExpressionTransfer::State {
+  const rig::Rig& source;
+  const rig::Rig& target;
+  bool same;
+  MaskTransfer mask;
+  std::optional<PartTransfer> parts;  // where the meshes differ
+  std::optional<DeformationTransfer> deformation;
+  Eigen::Matrix3d source_from_target = Eigen::Matrix3d::Identity();
+  std::vector<Float3> source_neutral, target_neutral;
+  std::size_t corresponding = 0;
+  double seconds = 0;
+
+  State(const rig::Rig& s, const rig::Rig& t)
+      : source(s), target(t), same(transfer::sameMesh(s.neutral, t.neutral)), mask(s, t),
+        source_neutral(toFloat(s.neutral.positions)), target_neutral(toFloat(t.neutral.positions)) {
+    if (!same) parts.emplace(s, t);
+  }
+
+  // The source's vertices, and after them the target's as the mask has them, turned into the source's frame: what of the
+  // target corresponds to nothing of the source takes its deformation from there.
+  rig::VertexPositions stacked(const rig::VertexPositions& of_source, const rig::VertexPositions& by_mask) const {
+    rig::VertexPositions all(of_source.rows() + by_mask.rows(), 3);
+    all.topRows(of_source.rows()) = of_source;
+    all.bottomRows(by_mask.rows()) = by_mask * source_from_target.transpose();
+    return all;
+  }
+
+  // Lids along the eyeball, lips and lids on their own side. On the same mesh, what the artist let pass on the source may
+  // pass on the target: an example's own lids lie on its eyeball as closely as it was made.
+  void resolve(const rig::VertexPositions& example, rig::VertexPositions& result) const {
+    if (target.contacts.empty()) return;
+    rig::VertexPositions moved = outOfContact(target.contacts, target_neutral, result);
+    if (same && !source.contacts.empty()) {
+      const rig::VertexPositions allowed = outOfContact(source.contacts, source_neutral, example);
+      const double size = target.fapu.fapu.eye_separation / source.fapu.fapu.eye_separation;
+      for (Eigen::Index v = 0; v < moved.rows(); ++v) {
+        const double length = moved.row(v).norm();
+        if (length > 0) moved.row(v) *= std::max(0.0, 1 - size * allowed.row(v).norm() / length);
+      }
+    }
+    result += moved;
+  }
+
+  void prepareDeformation(int threads) {
+    const auto source_triangles = rig::triangulate(source.neutral), target_triangles = rig::triangulate(target.neutral);
+    Correspondence c = same ? sameTopology(target.neutral) : correspondThroughGenericHead(source, target);
+    c.target_from_head = target.mesh_from_head;
+    c.target_from_source = target.mesh_from_head * source.mesh_from_head.transpose();
+    c.displacement_scale = ratioOfVertices(source, target);
+    source_from_target = c.target_from_source.transpose();
+    std::vector<Triangle> all_triangles = source_triangles;
+    rig::VertexPositions all_positions = source.neutral.positions;
+    for (const SurfacePoint& p : c.source_point) corresponding += isNone(p) ? 0U : 1U;
+    if (!same) {
+      const auto offset = static_cast<std::uint32_t>(source.neutral.vertexCount());
+      for (const Triangle& t : target_triangles) all_triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
+      all_positions = stacked(source.neutral.positions, target.neutral.positions);
+      for (std::size_t t = 0; t < target_triangles.size(); ++t)
+        if (c.source_triangle[t] < 0) c.source_triangle[t] = static_cast<std::int32_t>(source_triangles.size() + t);
+      for (std::uint32_t v = 0; v < c.source_point.size(); ++v) {
+        if (!isNone(c.source_point[v])) continue;
+        c.source_point[v] = {{offset + v, offset + v, offset + v}, {1, 0, 0}};
+        c.displacement_scale[v].setOnes();
+      }
+    }
+    deformation.emplace(all_positions, all_triangles, target.neutral.positions, target_triangles, weldOf(target),
+                        std::move(c), slitPairs(source, target), target.fapu.fapu.eye_separation,
+                        DeformationTransferOptions{.threads = threads});
+  }
+};
+
+ExpressionTransfer::ExpressionTransfer(const rig::Rig& source, const rig::Rig& target,
+                                       const ExpressionTransferOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
+  state_ = std::make_unique<State>(source, target);
+  if (options.method == Method::deformation) state_->prepareDeformation(options.threads);
+  state_->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+ExpressionTransfer::~ExpressionTransfer() = default;
+
+std::vector<rig::VertexPositions> ExpressionTransfer::transfer(std::span<const rig::VertexPositions> examples) const {
+  const State& s = *state_;
+  for (const rig::VertexPositions& example : examples)
+    if (example.rows() != s.source.neutral.positions.rows())
+      throw std::invalid_argument("ExpressionTransfer: an example with another number of vertices than the source");
+  std::vector<rig::VertexPositions> results(examples.size());
+  const bool by_mask = !s.deformation || !s.same;
+  if (by_mask)
+    rig::parallelFor(examples.size(), [&](std::size_t i) { results[i] = s.mask.transfer(examples[i]); });
+  if (s.deformation && s.same) results = s.deformation->transfer(examples);
+  if (s.deformation && !s.same) {
+    std::vector<rig::VertexPositions> all(examples.size());
+    rig::parallelFor(examples.size(), [&](std::size_t i) { all[i] = s.stacked(examples[i], results[i]); });
+    results = s.deformation->transfer(all);
+  }
+  rig::parallelFor(examples.size(), [&](std::size_t i) {
+    s.resolve(examples[i], results[i]);
+    if (s.parts) s.parts->apply(examples[i], results[i]);
+  });
+  return results;
+}
+
+bool ExpressionTransfer::sameMesh() const { return state_->same; }
+std::size_t ExpressionTransfer::maskPoints() const { return state_->mask.targetPointCount(); }
+std::size_t ExpressionTransfer::correspondingVertices() const { return state_->corresponding; }
+double ExpressionTransfer::secondsToPrepare() const { return state_->seconds; }
+
+}  // namespace volto::transfer

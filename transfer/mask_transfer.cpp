@@ -1,0 +1,71 @@
+#include "transfer/mask_transfer.h"
+
+#include "rig/fapu.h"
+
+namespace volto::transfer {
+namespace {
+
+Eigen::Vector3d scaleAt(const rig::Rig& rig, const MaskPlace& place) {
+  const rig::FeaturePointPositions scale = rig::fapuScale(rig.fapu.fapu);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < 3; ++i)
+    sum += place.barycentric[i] * scale.row(rig::maskTriangles()[place.triangle][i]).transpose();
+  return sum;
+}
+
+// The vertex that stands for a point of the mask: its own, or the nearest to a free position.
+std::uint32_t vertexOf(const rig::RefinedMask& mask, std::size_t point, const rig::VertexPositions& neutral) {
+  Eigen::Index v = mask.vertex[point];
+  if (v < 0)
+    (neutral.rowwise() - mask.positions.row(static_cast<Eigen::Index>(point))).rowwise().squaredNorm().minCoeff(&v);
+  return static_cast<std::uint32_t>(v);
+}
+
+}  // namespace
+
+Eigen::Vector3d fapuRatio(const rig::Rig& source, const rig::Rig& target, const MaskPlace& place) {
+  return scaleAt(target, place).cwiseQuotient(scaleAt(source, place));
+}
+
+bool sameMesh(const rig::Mesh& a, const rig::Mesh& b) {
+  return a.vertexCount() == b.vertexCount() && a.polygon_start == b.polygon_start &&
+         a.corner_vertices == b.corner_vertices;
+}
+
+MaskTransfer::MaskTransfer(const rig::Rig& source, const rig::Rig& target)
+    : source_(source), target_(target), mask_(drivingMask(target)) {
+  const rig::RefinedMask on_source = drivingMask(source);
+  source_points_ = on_source.pointCount();
+  const bool same = sameMesh(source.neutral, target.neutral);
+  const MaskInterpolation reading(on_source);
+  const std::vector<MaskPlace> places = placesOf(mask_);
+  readings_.resize(mask_.pointCount());
+  for (std::size_t p = 0; p < readings_.size(); ++p) {
+    Reading& r = readings_[p];
+    if (same) {
+      const std::uint32_t v = vertexOf(mask_, p, target.neutral.positions);
+      r.vertex = {v, v, v};
+      r.weight = {1, 0, 0};
+    } else {
+      const MaskInterpolation::Row row = reading.at(places[p]);
+      for (std::size_t i = 0; i < 3; ++i) r.vertex[i] = vertexOf(on_source, row.point[i], source.neutral.positions);
+      r.weight = row.weight;
+    }
+    r.target_from_source = target.mesh_from_head * fapuRatio(source, target, places[p]).asDiagonal() *
+                           source.mesh_from_head.transpose();
+  }
+}
+
+rig::VertexPositions MaskTransfer::transfer(const rig::VertexPositions& example) const {
+  rig::VertexPositions points(static_cast<Eigen::Index>(readings_.size()), 3);
+  for (std::size_t p = 0; p < readings_.size(); ++p) {
+    const Reading& r = readings_[p];
+    Eigen::Vector3d moved = Eigen::Vector3d::Zero();
+    for (std::size_t i = 0; i < 3; ++i)
+      moved += r.weight[i] * (example.row(r.vertex[i]) - source_.neutral.positions.row(r.vertex[i])).transpose();
+    points.row(static_cast<Eigen::Index>(p)) = (r.target_from_source * moved).transpose();
+  }
+  return target_.neutral.positions + rig::displaceVertices(mask_, points);
+}
+
+}  // namespace volto::transfer

@@ -1,0 +1,101 @@
+#include "transfer/part_transfer.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/SVD>
+
+#include "rig/closest_point.h"
+
+namespace volto::transfer {
+namespace {
+
+// Rotation and shift that take the vertices from one place to another best (Kabsch).
+struct RigidMotion {
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero(), shift = Eigen::Vector3d::Zero();
+};
+RigidMotion motionOf(const std::vector<std::uint32_t>& vertices, const rig::VertexPositions& from,
+                     const rig::VertexPositions& to) {
+  RigidMotion m;
+  Eigen::Vector3d moved = Eigen::Vector3d::Zero();
+  const double n = static_cast<double>(vertices.size());
+  for (const std::uint32_t v : vertices) {
+    m.centre += from.row(v).transpose() / n;
+    moved += to.row(v).transpose() / n;
+  }
+  m.shift = moved - m.centre;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  for (const std::uint32_t v : vertices)
+    covariance += (to.row(v).transpose() - moved) * (from.row(v).transpose() - m.centre).transpose();
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Vector3d sign(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1);
+  m.rotation = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
+  return m;
+}
+
+// Two axes in the triangle, one off it; orthonormal, so that lashes do not stretch with the lid.
+Eigen::Matrix3d frameOf(const rig::VertexPositions& p, const std::array<std::uint32_t, 3>& t) {
+  const Eigen::Vector3d a = p.row(t[0]), b = p.row(t[1]), c = p.row(t[2]);
+  Eigen::Matrix3d frame = Eigen::Matrix3d::Identity();
+  const Eigen::Vector3d along = b - a, normal = along.cross(c - a);
+  if (!(along.norm() > 0) || !(normal.norm() > 0)) return frame;
+  frame.col(0) = along.normalized();
+  frame.col(2) = normal.normalized();
+  frame.col(1) = frame.col(2).cross(frame.col(0));
+  return frame;
+}
+
+Eigen::Vector3d at(const rig::VertexPositions& p, const std::array<std::uint32_t, 3>& t, const std::array<double, 3>& w) {
+  return w[0] * p.row(t[0]).transpose() + w[1] * p.row(t[1]).transpose() + w[2] * p.row(t[2]).transpose();
+}
+
+}  // namespace
+
+PartTransfer::PartTransfer(const rig::Rig& source, const rig::Rig& target) : source_(source), target_(target) {
+  using Follows = rig::RigidPart::Follows;
+  for (const Follows follows : {Follows::jaw, Follows::left_eye, Follows::right_eye}) {
+    Turning t;
+    for (const auto& [rig, out] : {std::pair{&source, &t.source}, std::pair{&target, &t.target}})
+      for (const rig::RigidPart& part : rig->rigid_parts)
+        if (part.follows == follows) out->insert(out->end(), part.vertices.begin(), part.vertices.end());
+    if (t.source.size() >= 3 && !t.target.empty()) turning_.push_back(std::move(t));
+  }
+  std::vector<bool> part(target.neutral.vertexCount(), false);
+  for (const rig::RigidPart& p : target.rigid_parts)
+    for (const std::uint32_t v : p.vertices) part[v] = true;
+  std::vector<std::array<std::uint32_t, 3>> skin;
+  for (const auto& t : rig::triangulate(target.neutral))
+    if (!part[t[0]]) skin.push_back(t);
+  const rig::ClosestPoint nearest(target.neutral.positions, std::move(skin));
+  if (nearest.empty()) return;
+  for (const rig::RigidPart& p : target.rigid_parts) {
+    if (p.follows != Follows::skin) continue;
+    for (const std::uint32_t v : p.vertices) {
+      const Eigen::Vector3d here = target.neutral.positions.row(v);
+      const rig::SurfacePoint on = nearest.find(here);
+      if (on.triangle < 0) continue;
+      Rider rider{v, nearest.triangle(on.triangle), on.barycentric, {}};
+      rider.offset = frameOf(target.neutral.positions, rider.on).transpose() *
+                     (here - at(target.neutral.positions, rider.on, rider.weight));
+      riders_.push_back(rider);
+    }
+  }
+}
+
+void PartTransfer::apply(const rig::VertexPositions& example, rig::VertexPositions& result) const {
+  const Eigen::Matrix3d turn = target_.mesh_from_head * source_.mesh_from_head.transpose();
+  const double size = target_.fapu.fapu.eye_separation / source_.fapu.fapu.eye_separation;
+  for (const Turning& t : turning_) {
+    const RigidMotion on_source = motionOf(t.source, source_.neutral.positions, example);
+    const Eigen::Matrix3d rotation = turn * on_source.rotation * turn.transpose();
+    const Eigen::Vector3d shift = size * (turn * on_source.shift);
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+    for (const std::uint32_t v : t.target)
+      centre += target_.neutral.positions.row(v).transpose() / static_cast<double>(t.target.size());
+    for (const std::uint32_t v : t.target)
+      result.row(v) = (rotation * (target_.neutral.positions.row(v).transpose() - centre) + centre + shift).transpose();
+  }
+  for (const Rider& r : riders_)
+    result.row(r.vertex) = (at(result, r.on, r.weight) + frameOf(result, r.on) * r.offset).transpose();
+}
+
+}  // namespace volto::transfer
