@@ -1,5 +1,6 @@
 #include "tracker/head_filter.h"
 
+#include <cmath>
 #include <numbers>
 
 #include <Eigen/Geometry>
@@ -38,7 +39,7 @@ void HeadFilter::push(double dt_s, double smoothing, Eigen::Matrix3d& rotation, 
   const Eigen::AngleAxisd way(rotation_.transpose() * rotation);
   const Eigen::Vector3d turn = way.angle() * way.axis();
   speed_ += share(kTurn.speed_cutoff_hz, dt_s) * (turn / dt_s - speed_);
-  const double cutoff_hz = kTurn.min_cutoff_hz / smoothing + kTurn.beta * speed_.norm();
+  const double cutoff_hz = kTurn.min_cutoff_hz / smoothing + kTurn.beta / std::sqrt(smoothing) * speed_.norm();
   rotation_ = Eigen::Quaterniond(rotation_ *
                                  Eigen::AngleAxisd(share(cutoff_hz, dt_s) * way.angle(), way.axis()).toRotationMatrix())
                   .normalized()

@@ -23,7 +23,8 @@ double OneEuro::push(double value, double dt_s, const OneEuroConstants& constant
   }
   const double speed = (value - value_) / dt_s;
   speed_ += share(constants.speed_cutoff_hz, dt_s) * (speed - speed_);
-  const double cutoff_hz = constants.min_cutoff_hz / smoothing + constants.beta * std::abs(speed_);
+  const double cutoff_hz =
+      constants.min_cutoff_hz / smoothing + constants.beta / std::sqrt(smoothing) * std::abs(speed_);
   value_ += share(cutoff_hz, dt_s) * (value - value_);
   return value_;
 }

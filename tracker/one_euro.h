@@ -14,7 +14,8 @@ struct OneEuroConstants {
 // One signal. Allocates nothing; the state is three numbers.
 class OneEuro {
  public:
-  // dt_s > 0. `smoothing` divides the cut-off at rest: 1 as the constants say, 2 twice as stiff. 0 passes the signal
+  // dt_s > 0. `smoothing` divides the cut-off at rest, and its square root beta, since a detector's shaking is speed
+  // too: 1 as the constants say, 4 four times as stiff at rest and half as ready to follow. 0 passes the signal
   // through.
   double push(double value, double dt_s, const OneEuroConstants& constants, double smoothing);
   // The next value is taken as it is.

@@ -6,19 +6,23 @@
 namespace volto::tracker {
 namespace {
 
-// Weights are 0..1, so a speed of 5 per second is a mouth that opens in 0.2 s: with beta 15 its cut-off is 75 Hz above
-// the one at rest. The fit itself knows that expressions persist (Settings::expression_memory_s), so these are light.
-constexpr OneEuroConstants kLids{12.0, 15.0};
-constexpr OneEuroConstants kBrows{5.0, 5.0};
-constexpr OneEuroConstants kMouth{12.0, 15.0};
-constexpr OneEuroConstants kElsewhere{5.0, 5.0};  // nose, cheeks
+// Weights are 0..1, so a speed of 4 per second is a jaw that opens in 0.15 s: with beta 14 its cut-off is 56 Hz above
+// the one at rest. The speed's own cut-off lets a blink through that lasts five pictures.
+//
+// Exact landmarks are hardly filtered; a detector's shake, and twice as much is taken off a face at rest.
+// tests/tools/filter_table_test.cpp has the table by which these were found.
+constexpr OneEuroConstants kLids{12.0, 15.0}, kLidsFromPixels{2.0, 14.0, 3.0};
+constexpr OneEuroConstants kMouth{12.0, 15.0}, kMouthFromPixels{1.5, 14.0, 3.0};
+constexpr OneEuroConstants kElsewhere{5.0, 5.0}, kElsewhereFromPixels{1.0, 5.0, 2.0};  // brows, nose, cheeks
 
 // Residuals are millimetres; detector noise lives here, so they are held stiller than the weights.
 constexpr OneEuroConstants kLidPoints{3.0, 0.2};
 constexpr OneEuroConstants kMouthPoints{2.5, 0.15};
 constexpr OneEuroConstants kOtherPoints{1.0, 0.05};
 
-constexpr std::array<OneEuroConstants, 4> kShapeConstants = {kLids, kBrows, kMouth, kElsewhere};
+constexpr std::array<OneEuroConstants, 4> kShapeConstants = {kLids, kElsewhere, kMouth, kElsewhere};
+constexpr std::array<OneEuroConstants, 4> kShapeConstantsFromPixels = {kLidsFromPixels, kElsewhereFromPixels,
+                                                                       kMouthFromPixels, kElsewhereFromPixels};
 constexpr std::array<OneEuroConstants, 4> kPointConstants = {kLidPoints, kOtherPoints, kMouthPoints, kOtherPoints};
 
 }  // namespace
@@ -50,10 +54,11 @@ RegionFilters::Region RegionFilters::regionOf(rig::FaceRegion region) {
   }
 }
 
-RegionFilters::RegionFilters() {
+RegionFilters::RegionFilters(bool from_pixels) {
+  const auto& shape_constants = from_pixels ? kShapeConstantsFromPixels : kShapeConstants;
   for (std::size_t k = 0; k < kArkitBlendshapeCount; ++k) {
     shape_region_[k] = regionOf(kArkitBlendshapeNames[k]);
-    shape_constants_[k] = kShapeConstants[static_cast<std::size_t>(shape_region_[k])];
+    shape_constants_[k] = shape_constants[static_cast<std::size_t>(shape_region_[k])];
   }
   const auto points = rig::featurePoints();
   for (std::size_t i = 0; i < kFeaturePointCount; ++i) {

@@ -16,7 +16,8 @@ namespace volto::tracker {
 // Filters weights, and what the measured points add to them, each with the constants of its region.
 class RegionFilters {
  public:
-  RegionFilters();
+  // `from_pixels`: for landmarks of a detector (TrackerOptions::from_pixels).
+  explicit RegionFilters(bool from_pixels);
 
   void reset();
   // In place. `rest_mm`: displacement of each point beyond what the weights explain, 84 by 3.

@@ -47,7 +47,7 @@ std::size_t eyeBlinkIndex(std::size_t eye) {
 
 struct Tracker::State {
   State(const TrackerOptions& o, const rig::ExpressionTable& t, const Settings& s, const ExpressionPrior& e)
-      : options(o), table(&t), settings(s), expression(&e) {
+      : options(o), table(&t), settings(s), expression(&e), filters(o.from_pixels) {
     build(LandmarkLayout::ibug68);
   }
 
