@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
@@ -13,6 +14,8 @@ namespace {
 constexpr double kNearestDepth = 20.0;  // mm: no camera is nearer to a point of a face
 constexpr double kMostCounted = 3.0;    // one point far astray says no more about the fit than this many outlier limits
 constexpr int kSmallestFace = 6;        // points
+constexpr double kRunsAway = 1.1;       // a step that makes the fit worse by more than this is none; a little worse it
+                                        // may become, since residuals are counted at the head's distance, which moves
 
 Eigen::Matrix<double, 3, 6> motionJacobian(const Eigen::Vector3d& p) {
   Eigen::Matrix<double, 3, 6> q;
@@ -56,7 +59,7 @@ bool FrameFit::evaluate(const Observation& seen, const ViewPose& pose, const Sha
   for (std::size_t c = 0; c < 3; ++c) moved_[c].noalias() = basis_->axes()[c] * w;
 
   const double distance = std::max(-pose.translation.z(), kNearestDepth);
-  double sum = 0, weight_sum = 0;
+  double sum = 0, weight_sum = 0, cost = 0;
   pose_gradient_.setZero();
   view_rows_ = seen.has_depth ? 3 : 2;
   for (int p = 0; p < points_.count(); ++p) {
@@ -90,6 +93,8 @@ bool FrameFit::evaluate(const Observation& seen, const ViewPose& pose, const Sha
     const double counted = std::min(norm, kMostCounted * outlier_mm_);
     sum += cut * counted * counted;
     weight_sum += cut;
+    cost +=
+        cut * points_.trust[p] * (norm > outlier_mm_ ? outlier_mm_ * (norm - 0.5 * outlier_mm_) : 0.5 * norm * norm);
     if (norm > outlier_mm_) cut *= outlier_mm_ / norm;
     pull *= cut * points_.trust[p];
     gradient_.segment<3>(3 * p) = pull;
@@ -98,6 +103,7 @@ bool FrameFit::evaluate(const Observation& seen, const ViewPose& pose, const Sha
     pose_gradient_.tail<3>() += pull;
   }
   rms_mm_ = weight_sum > 0 ? std::sqrt(sum / weight_sum) : 0;
+  cost_ = cost / variance_;
   return std::isfinite(sum) && pose_gradient_.allFinite();
 }
 
@@ -148,6 +154,12 @@ bool FrameFit::improve(const Observation& seen, const WeightPrior& prior, int it
   if (kept == nullptr) composeNormalMatrices(seen);
   const NormalMatrices& normal = kept != nullptr ? *kept : normal_;
   posterior_ = normal.information + prior.precision;
+  const auto costOf = [&](const ShapeVector& w) {
+    const ShapeVector off = w - prior.mean;
+    return cost_ + 0.5 * off.dot(prior.precision * off);
+  };
+  double cost = costOf(tried);
+  bool linearised_here = true;  // at the pose and weights that the next step starts from
   for (int iteration = 0; iteration < iterations; ++iteration) {
     pose_gradient_ /= variance_;
     const Pose6 free_pose = normal.pose_inverse * pose_gradient_;
@@ -158,6 +170,7 @@ bool FrameFit::improve(const Observation& seen, const WeightPrior& prior, int it
     slope.noalias() -= normal.cross.transpose() * free_pose;
     slope.noalias() -= prior.precision * (tried - prior.mean);
     const ShapeVector before = tried;
+    const ViewPose pose_before = tried_pose;
     for (int sweep = 0; sweep < sweeps; ++sweep) {
       double largest = 0;
       for (int k = 0; k < kShapes; ++k) {
@@ -171,7 +184,25 @@ bool FrameFit::improve(const Observation& seen, const WeightPrior& prior, int it
     }
     const Pose6 step = free_pose - normal.pose_inverse * (normal.cross * (tried - before));
     moveHead(step, tried_pose);
+    const bool possible = evaluate(seen, tried_pose, tried);
+    const double now = possible ? costOf(tried) : std::numeric_limits<double>::infinity();
+    if (kept != nullptr) {
+      if (!possible) return false;
+      continue;
+    }
+    if (now <= kRunsAway * cost) {
+      cost = std::min(cost, now);
+      linearised_here = false;
+      continue;
+    }
+    // Steps along an old linearisation may run away (a face far from rest, a pose from nothing): back, and anew.
+    tried = before;
+    tried_pose = pose_before;
     if (!evaluate(seen, tried_pose, tried)) return false;
+    if (linearised_here) break;
+    composeNormalMatrices(seen);
+    posterior_ = normal.information + prior.precision;
+    linearised_here = true;
   }
   if (!tried.allFinite() || !tried_pose.rotation.allFinite() || !tried_pose.translation.allFinite()) return false;
   pose = tried_pose;

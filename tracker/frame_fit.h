@@ -3,8 +3,8 @@
 //
 // Gauss-Newton on pose and weights together: the pose is eliminated (Schur complement), the weights are found by
 // coordinate descent within their bounds (warm start). The normal matrix is made once per frame, residuals and
-// gradients in every iteration. Outliers have their residual cut (the modified residuals of Huber and Dutter), which
-// leaves the matrix alone.
+// gradients in every iteration; a step that makes the fit worse is taken back, and the matrix made anew. Outliers have
+// their residual cut (the modified residuals of Huber and Dutter), which leaves the matrix alone.
 #pragma once
 
 #include <vector>
@@ -101,6 +101,7 @@ class FrameFit {
   ShapeMatrix posterior_;
   Pose6 pose_gradient_;
   double rms_mm_ = 0;
+  double cost_ = 0;  // of the points' residuals: what the steps make smaller, without the prior's share
 };
 
 }  // namespace volto::tracker

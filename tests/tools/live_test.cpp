@@ -4,6 +4,7 @@
 #include <arpa/inet.h>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstring>
 #include <mutex>
 #include <netinet/in.h>
@@ -14,6 +15,7 @@
 #include <gtest/gtest.h>
 
 #include "capture/detection/model_manifest.h"
+#include "capture/face_choice.h"
 #include "capture/video/video_source.h"
 #include "protocol/take_reader.h"
 #include "tests/retarget/synthetic_rig.h"
@@ -147,7 +149,8 @@ TEST_F(LiveDatagrams, StoppingTakesLessThanASecondWithAndWithoutInput) {
 
 class LiveVideo : public LiveTest {
  protected:
-  LiveInput open(const std::filesystem::path& data, const capture::VideoOptions& options = {}) {
+  LiveInput open(const std::filesystem::path& data, const capture::VideoOptions& options = {},
+                 const char* video = "head-pose-face-detection-male.gif", const char* face = "front") {
     LiveInput input;
     input.name = "video";
     input.live = false;
@@ -157,8 +160,8 @@ class LiveVideo : public LiveTest {
     input.finder.emplace(
         capture::FaceDetector(faces.manifest, capture::readModelBytes(faces, false), faces.path.string()),
         capture::LandmarkModel(points.manifest, capture::readModelBytes(points, false), points.path.string()),
-        capture::FaceFinderOptions{});
-    input.images = capture::openVideo(data / "video/head-pose-face-detection-male.gif", options);
+        capture::FaceFinderOptions{.choice = capture::parseFaceChoice(face)});
+    input.images = capture::openVideo(data / "video" / video, options);
     return input;
   }
   std::vector<LandmarkFrame> record(const std::filesystem::path& data, const std::string& name) {
@@ -193,6 +196,40 @@ TEST_F(LiveVideo, EveryFrameIsTrackedInOrderAndTwiceTheSame) {
     EXPECT_TRUE(first[i].face_present);
     EXPECT_EQ(first[i].t_capture_ns, second[i].t_capture_ns) << "the file's own times";
     EXPECT_EQ(first[i].points_px, second[i].points_px) << "frame " << i;
+  }
+}
+
+// One laughs from the first picture on, two lean their heads far over.
+TEST_F(LiveVideo, BothGifsAreTrackedInEveryFrameAndNoHeadJumps) {
+  VOLTO_REQUIRE_DATA(data);
+  struct Case {
+    const char *video, *face;
+    double farthest_roll_deg;
+  };
+  for (const Case& one :
+       {Case{"head-pose-face-detection-male.gif", "front", 0}, Case{"head-pose-face-detection-female-and-male.gif", "1", 40},
+        Case{"head-pose-face-detection-female-and-male.gif", "2", 35}}) {
+    masks.clear();
+    LiveOptions options = watched();
+    options.every_frame = true;
+    options.tracking.tracker.from_pixels = true;
+    Live live(rig, open(data, {}, one.video, one.face), publisher, options);
+    live.start();
+    while (!live.waitForEnd(100ms)) {
+    }
+    live.stop();
+    EXPECT_EQ(live.report().faces, live.report().frames_sent) << one.video << " " << one.face;
+    ASSERT_FALSE(masks.empty());
+    double farthest = 0;
+    for (std::size_t i = 0; i < masks.size(); ++i) {
+      EXPECT_EQ(masks[i].state, TrackingState::tracking) << one.video << " " << one.face << " frame " << i;
+      farthest = std::max(farthest, std::abs(masks[i].head.roll_rad) * 57.2958);
+      if (i == 0) continue;
+      const HeadPose &a = masks[i - 1].head, &b = masks[i].head;
+      for (const float step_rad : {b.yaw_rad - a.yaw_rad, b.pitch_rad - a.pitch_rad, b.roll_rad - a.roll_rad})
+        EXPECT_LT(std::abs(step_rad) * 57.2958, 8) << one.video << " " << one.face << " frame " << i;
+    }
+    EXPECT_GT(farthest, one.farthest_roll_deg) << one.video << " " << one.face;
   }
 }
 

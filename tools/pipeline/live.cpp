@@ -283,7 +283,7 @@ void Live::State::track() {
     last_layout = in.landmarks.layout;
     tracker_meter.add(path.trackedAt() - before);
     retarget_meter.add(path.retargetedAt() - path.trackedAt());
-    if (in.landmarks.face_present) ++faces;
+    if (path.mask().state == TrackingState::tracking) ++faces;
     if (before - noted_ns > kReportInterval_ns) {
       noted_ns = before;
       tracker::NeutralFace known = path.neutral();
@@ -318,6 +318,7 @@ void Live::State::publish() {
     if (taken == Slot<Shown>::Taken::nothing) continue;
     const std::int64_t before = monotonicNow();
     if (take != nullptr) (void)take->append(item.landmarks, source_name);
+    const std::int64_t t_source_ns = item.landmarks.t_capture_ns;
     item.landmarks.t_capture_ns = item.mask.t_capture_ns = item.avatar.t_capture_ns = item.t_shown_ns;
     publisher.push(item.landmarks);
     publisher.push(item.mask);
@@ -327,7 +328,8 @@ void Live::State::publish() {
     publish_meter.add(sent - before);
     whole_meter.add(sent - item.arrived_ns);
     ++frames_sent;
-    if (options.look) options.look({input.images ? &item.image : nullptr, item.landmarks, item.mask, item.avatar});
+    if (options.look)
+      options.look({input.images ? &item.image : nullptr, item.landmarks, item.mask, item.avatar, t_source_ns});
   }
   sendReport(protocol::PipelineState::no_signal);
   const std::lock_guard lock(mutex);

@@ -39,6 +39,7 @@ struct LiveFrame {
   const LandmarkFrame& landmarks;
   const MaskFrame& mask;
   const AvatarFrame& avatar;
+  std::int64_t t_source_ns;  // in the source's own time: a file's, where the frames bear the time of their showing
 };
 
 struct LiveOptions {
@@ -68,7 +69,7 @@ struct LiveReport {
   std::string notice;  // of the source: something to mend
   capture::FaceFinderCounters finder;
   capture::DatagramCounters datagrams;
-  std::uint64_t frames_sent = 0, faces = 0;
+  std::uint64_t frames_sent = 0, faces = 0;  // faces: frames in which one was tracked, not only found
   std::uint64_t calibrations = 0;
   double seconds = 0;
 };

@@ -52,6 +52,7 @@ struct Seen {
   std::int64_t t_ns = 0;
   HeadPose head;
   std::vector<std::array<float, 3>> vertices;
+  bool tracked = false;
   float jaw_open = 0, blink_left = 0, blink_right = 0, smile = 0;
 };
 
@@ -66,6 +67,7 @@ void copyInto(const LiveFrame& frame, std::int64_t t_ns, Seen& out) {
   out.landmarks = frame.landmarks;
   out.t_ns = t_ns;
   out.head = frame.mask.head;
+  out.tracked = frame.mask.state == TrackingState::tracking;
   out.vertices = frame.avatar.vertices;
   out.jaw_open = weightOf(frame.mask, "jawOpen");
   out.blink_left = weightOf(frame.mask, "eyeBlinkLeft");
@@ -206,8 +208,8 @@ Preview::~Preview() {
 
 void Preview::look(const LiveFrame& frame) {
   State& s = *state_;
-  if (s.first_ns < 0) s.first_ns = frame.landmarks.t_capture_ns;
-  const std::int64_t t_ns = frame.landmarks.t_capture_ns - s.first_ns;
+  if (s.first_ns < 0) s.first_ns = frame.t_source_ns;
+  const std::int64_t t_ns = frame.t_source_ns - s.first_ns;
   if (!s.options.live.empty()) {
     if (const std::int64_t now = monotonicNow(); now >= s.next_live_ns) {
       s.next_live_ns = now + static_cast<std::int64_t>(s.options.interval_s * 1e9);
@@ -239,7 +241,9 @@ void Preview::finish() {
                   static_cast<double>(seen.t_ns) * 1e-9, static_cast<double>(seen.jaw_open),
                   static_cast<double>(seen.blink_right), static_cast<double>(seen.blink_left),
                   static_cast<double>(seen.smile));
-    cells.push_back({s.draw(seen), seen.landmarks.face_present ? caption : "no face"});
+    cells.push_back({s.draw(seen), !seen.landmarks.face_present ? "no face"
+                                   : seen.tracked               ? caption
+                                                                : "a face, not tracked"});
   }
   picture::writePng(s.options.sheet, picture::contactSheet(cells, std::min<std::size_t>(4, cells.size())));
 }
