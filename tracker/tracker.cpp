@@ -250,10 +250,9 @@ void Tracker::State::measure(const LandmarkFrame& in, double dt_s, MaskFrame& ou
     out.arkit_weights[k] = p.shows()[k] ? static_cast<float>(weights[static_cast<Eigen::Index>(k)]) : 0.0F;
   if (options.from_pixels) {
     for (std::size_t eye = 0; eye < 2; ++eye) {
-      // The eyes of one face are alike to a detector: what one has shown first holds for both.
-      if (!lids[eye].known() && lids[1 - eye].known()) lids[eye].start(lids[1 - eye].range());
-      float& blink = out.arkit_weights[eyeBlinkIndex(eye)];
-      blink = lids[eye].push(blink, dt_s);
+      const std::optional<float> opening = eyeOpening(in, eye, pose.rotation);
+      if (!opening && lids[eye].range().open <= 0) continue;  // never seen: as fitted
+      out.arkit_weights[eyeBlinkIndex(eye)] = opening ? lids[eye].push(*opening, dt_s) : lids[eye].last();
     }
   }
   filters.push(dt_s, options.smoothing, options.regions, out.arkit_weights, rest_mm);

@@ -15,8 +15,8 @@ namespace volto::tracker {
 struct Settings;        // tracker/settings.h
 class ExpressionPrior;  // tracker/expression_prior.h
 
-// What the detector makes of one of the actor's lids: the eyeBlink weight of an open and of a closed eye. Both 0: not
-// known.
+// What the detector makes of one of the actor's lids: how far an open and a closed eye's stand apart, as a share of the
+// distance between the outer corners of the eyes. Both 0: not known.
 struct LidRange {
   float open = 0, closed = 0;
 };

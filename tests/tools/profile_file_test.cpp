@@ -18,7 +18,7 @@ tracker::NeutralFace someFace() {
   face.confidence.fill(0.5F);
   face.usual[3] = 0.25F;
   face.deviation[3] = 0.125F;
-  face.lids[1] = {0.05F, 0.5F};
+  face.lids[1] = {0.11F, 0.06F};
   return face;
 }
 
@@ -42,7 +42,7 @@ TEST(ProfileFile, ComesBackAsItWent) {
   EXPECT_EQ(back.confidence, face.confidence);
   EXPECT_EQ(back.usual, face.usual);
   EXPECT_EQ(back.deviation, face.deviation);
-  EXPECT_EQ(back.lids[1].closed, 0.5F);
+  EXPECT_EQ(back.lids[1].closed, 0.06F);
 }
 
 TEST(ProfileFile, WhatIsNoProfileIsToldInOneLine) {
