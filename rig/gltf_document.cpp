@@ -22,6 +22,7 @@ using Json = nlohmann::json;
 constexpr std::size_t kMaxJsonBytes = std::size_t{64} << 20;
 constexpr int kMaxJsonDepth = 64;
 constexpr std::size_t kMaxBuffers = 1024;
+constexpr std::size_t kMaxTargets = 4096;
 static_assert(std::endian::native == std::endian::little);
 
 std::uint32_t word(std::string_view bytes, std::size_t at) {
@@ -281,7 +282,7 @@ class Opener {
     };
     keep("scenes", {"nodes"});
     keep("nodes", {"children", "mesh", "skin", "matrix", "translation", "rotation", "scale", "name"});
-    keep("meshes", {"primitives", "name"});
+    keep("meshes", {"primitives", "name", "extras"});
     keep("accessors", {"bufferView", "byteOffset", "componentType", "normalized", "count", "type", "sparse"});
     keep("bufferViews", {"buffer", "byteOffset", "byteLength", "byteStride"});
     keep("materials", {"name", "pbrMetallicRoughness"});
@@ -298,8 +299,11 @@ class Opener {
       if (!mesh.contains("primitives") || !mesh["primitives"].is_array()) fail("a mesh without primitives");
       for (Json& primitive : mesh["primitives"]) {
         if (!primitive.is_object()) fail("a primitive that is no object");
-        for (const char* key : {"extensions", "extras", "targets"}) primitive.erase(key);
+        for (const char* key : {"extensions", "extras"}) primitive.erase(key);
+        keepTargetPositions(primitive);
       }
+      document_.target_names.push_back(targetNames(mesh));
+      mesh.erase("extras");
     }
     const std::string text = kept.dump(-1, ' ', true, Json::error_handler_t::replace);
     tinygltf::TinyGLTF loader;
@@ -314,6 +318,27 @@ class Opener {
     }
     if (document_.textured.size() != document_.model.materials.size())
       document_.textured.resize(document_.model.materials.size(), false);
+  }
+
+  // Of the morph targets only how they move the vertices.
+  void keepTargetPositions(Json& primitive) const {
+    const auto targets = primitive.find("targets");
+    if (targets == primitive.end()) return;
+    if (!targets->is_array() || targets->size() > kMaxTargets) fail("'targets' is no list of at most 4096 morph targets");
+    for (Json& target : *targets) {
+      if (!target.is_object()) fail("a morph target that is no object");
+      const Json* position = member(target, "POSITION");
+      if (position != nullptr && !position->is_number_unsigned()) fail("a morph target whose POSITION is no accessor");
+      target = position == nullptr ? Json::object() : Json{{"POSITION", *position}};
+    }
+  }
+  std::vector<std::string> targetNames(const Json& mesh) const {
+    std::vector<std::string> out;
+    const Json* extras = member(mesh, "extras");
+    const Json* names = extras != nullptr && extras->is_object() ? member(*extras, "targetNames") : nullptr;
+    if (names == nullptr || !names->is_array() || names->size() > kMaxTargets) return out;
+    for (const Json& name : *names) out.push_back(name.is_string() ? name.get<std::string>() : std::string());
+    return out;
   }
 
   std::string_view bytes_;

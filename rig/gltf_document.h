@@ -18,6 +18,7 @@ struct GltfDocument {
   std::vector<std::string_view> buffers;
   std::vector<std::string> owned;  // bytes of buffers that are not part of the file itself
   std::vector<bool> textured;      // of each material: its colour comes from an image, which is not read
+  std::vector<std::vector<std::string>> target_names;  // of each mesh: extras.targetNames; empty where it has none
 };
 
 // Throws InputError "name: @byte: what" or "name: what". Checked here: the GLB container, JSON (depth at most 64),

@@ -2,6 +2,7 @@
 //
 // What Volto writes itself (tools/export) carries the vertex index of the artist's mesh as attribute _VOLTO_VERTEX;
 // such a file is put together again as it was.
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <map>
@@ -28,10 +29,12 @@ constexpr const char* kVertexAttribute = "_VOLTO_VERTEX";
 
 class GltfMeshReader {
  public:
-  GltfMeshReader(const GltfDocument& document, const std::string& name)
-      : document_(document), model_(document.model), name_(name) {}
+  GltfMeshReader(const GltfDocument& document, const std::string& name, bool with_shapes)
+      : document_(document), model_(document.model), name_(name), with_shapes_(with_shapes) {}
 
-  Mesh read() {
+  Mesh read() { return std::move(readShaped().mesh); }
+
+  ShapedMesh readShaped() {
     for (const Placed& placed : placedMeshes()) addMesh(placed);
     if (mesh_.corner_vertices.empty())
       fail(skipped_ > 0 ? "only points and lines, no faces; nothing can be rigged"
@@ -46,9 +49,17 @@ class GltfMeshReader {
       for (const std::uint32_t v : mesh_.corner_vertices) mesh_.corner_texcoords.push_back(texcoords_[v]);
     }
     nameMaterials();
-    putBackTogether();
+    ShapedMesh out;
+    for (auto& [name, displacement] : shapes_) {
+      displacement.resize(coordinates_.size(), 0.0);
+      out.names.push_back(name);
+      out.positions.push_back(mesh_.positions + Eigen::Map<const VertexPositions>(displacement.data(),
+                                                                                  mesh_.positions.rows(), 3));
+    }
+    putBackTogether(out.positions);
     mesh_.notes = notes_.take();
-    return std::move(mesh_);
+    out.mesh = std::move(mesh_);
+    return out;
   }
 
  private:
@@ -154,6 +165,7 @@ class GltfMeshReader {
       const std::size_t count = fresh ? addVertices(position->second, placed.scene_from_mesh)
                                       : model_.accessors[static_cast<std::size_t>(position->second)].count;
       addAttributes(primitive, entry->second, count);
+      if (fresh && with_shapes_) addTargets(primitive, placed, entry->second, count);
       addTriangles(primitive, mode, entry->second, count, mirrored);
     }
   }
@@ -223,6 +235,31 @@ class GltfMeshReader {
     }
   }
 
+  void addTargets(const tinygltf::Primitive& primitive, const Placed& placed, std::uint32_t first, std::size_t count) {
+    const auto& names = document_.target_names[static_cast<std::size_t>(placed.mesh)];
+    std::set<std::string> here;
+    for (std::size_t k = 0; k < primitive.targets.size(); ++k) {
+      const std::string given = k < names.size() ? tidyText(names[k]) : std::string();
+      const std::string name = given.empty() ? "target " + std::to_string(k) : given;
+      if (!here.insert(name).second) fail("two morph targets of one mesh are called '" + name + "'; rename one");
+      auto shape = std::find_if(shapes_.begin(), shapes_.end(), [&](const auto& s) { return s.first == name; });
+      if (shape == shapes_.end()) shape = shapes_.insert(shape, {name, {}});
+      const auto position = primitive.targets[k].find("POSITION");
+      if (position == primitive.targets[k].end()) continue;  // changes normals alone
+      const std::vector<double> by = values(position->second, 3, kMaxVertices);
+      if (by.size() != 3 * count)
+        fail("morph target '" + name + "' for " + std::to_string(by.size() / 3) + " vertices, the primitive has " +
+             std::to_string(count));
+      shape->second.resize(coordinates_.size(), 0.0);
+      for (std::size_t v = 0; v < count; ++v) {
+        const Eigen::Vector3d moved =
+            placed.scene_from_mesh.linear() * Eigen::Vector3d(by[3 * v], by[3 * v + 1], by[3 * v + 2]);
+        if (!moved.allFinite()) fail("morph target '" + name + "' moves a vertex by what is not finite");
+        for (int c = 0; c < 3; ++c) shape->second[3 * (first + v) + static_cast<std::size_t>(c)] = moved[c];
+      }
+    }
+  }
+
   void addTriangles(const tinygltf::Primitive& primitive, int mode, std::uint32_t first, std::size_t count,
                     bool mirrored) {
     std::vector<std::uint32_t> corners;
@@ -284,16 +321,20 @@ class GltfMeshReader {
       mesh_.materials.push_back(std::move(out));
     }
   }
-  static std::string tidyName(const std::string& name, int number) {
+  static std::string tidyText(const std::string& name) {
     std::string out = name.substr(0, 256);
     for (char& c : out)
       if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) c = ' ';
     const std::size_t first = out.find_first_not_of(' '), last = out.find_last_not_of(' ');
-    return first == out.npos ? "material " + std::to_string(number) : out.substr(first, last - first + 1);
+    return first == out.npos ? std::string() : out.substr(first, last - first + 1);
+  }
+  static std::string tidyName(const std::string& name, int number) {
+    const std::string out = tidyText(name);
+    return out.empty() ? "material " + std::to_string(number) : out;
   }
 
   // The artist's vertices again, where every vertex says which it was and all that say the same are at the same place.
-  void putBackTogether() {
+  void putBackTogether(std::vector<VertexPositions>& shapes) {
     const std::size_t vertices = mesh_.vertexCount();
     std::size_t wanted = 0;
     for (const double number : original_) {
@@ -306,6 +347,8 @@ class GltfMeshReader {
       if (first < 0) first = static_cast<std::int64_t>(v);
       const auto a = static_cast<Eigen::Index>(first), b = static_cast<Eigen::Index>(v);
       if (mesh_.positions.row(a) != mesh_.positions.row(b)) return;
+      for (const VertexPositions& shape : shapes)
+        if (shape.row(a) != shape.row(b)) return;
     }
     for (const std::int64_t v : from)
       if (v < 0) return;
@@ -314,6 +357,11 @@ class GltfMeshReader {
     for (std::size_t w = 0; w < wanted; ++w) {
       positions.row(static_cast<Eigen::Index>(w)) = mesh_.positions.row(from[w]);
       if (has_colours_) colours.push_back(mesh_.vertex_colours[static_cast<std::size_t>(from[w])]);
+    }
+    for (VertexPositions& shape : shapes) {
+      VertexPositions whole(static_cast<Eigen::Index>(wanted), 3);
+      for (std::size_t w = 0; w < wanted; ++w) whole.row(static_cast<Eigen::Index>(w)) = shape.row(from[w]);
+      shape = std::move(whole);
     }
     mesh_.positions = std::move(positions);
     mesh_.vertex_colours = std::move(colours);
@@ -332,6 +380,8 @@ class GltfMeshReader {
   std::vector<int> materials_;                   // of triangles, the file's numbers
   bool has_texcoords_ = false, has_colours_ = false;
   std::size_t skipped_ = 0, values_read_ = 0;
+  bool with_shapes_ = false;
+  std::vector<std::pair<std::string, std::vector<double>>> shapes_;  // name, displacement of the vertices so far
   std::set<std::pair<std::uint32_t, int>> applied_;  // first vertex and accessor of attributes that were read
 };
 
@@ -339,7 +389,15 @@ class GltfMeshReader {
 
 Mesh parseGltf(std::string_view bytes, const std::string& name_for_errors, const std::filesystem::path& folder) {
   const GltfDocument document = openGltf(bytes, name_for_errors, folder);
-  return GltfMeshReader(document, name_for_errors).read();
+  return GltfMeshReader(document, name_for_errors, false).read();
+}
+
+ShapedMesh parseGltfShapes(std::string_view bytes, const std::string& name_for_errors,
+                           const std::filesystem::path& folder) {
+  const GltfDocument document = openGltf(bytes, name_for_errors, folder);
+  ShapedMesh out = GltfMeshReader(document, name_for_errors, true).readShaped();
+  if (out.names.empty()) throw InputError(name_for_errors + ": has no morph targets; export it with its shape keys");
+  return out;
 }
 
 }  // namespace volto::rig

@@ -65,6 +65,10 @@ Mesh readMesh(const std::filesystem::path& path) {
   throw InputError(name + ": cannot read '" + extension + "' meshes; give an OBJ, PLY, OFF, STL, glTF or GLB file");
 }
 
+ShapedMesh readGltfShapes(const std::filesystem::path& path) {
+  return parseGltfShapes(readFileBytes(path, kMaxMeshFileBytes), path.string(), folderOf(path));
+}
+
 std::string formatObj(const Mesh& mesh, const VertexPositions& positions, const ObjOptions& options) {
   if (positions.rows() != mesh.positions.rows())
     throw std::invalid_argument("formatObj: " + std::to_string(positions.rows()) + " positions for a mesh of " +

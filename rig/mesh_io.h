@@ -37,6 +37,18 @@ Mesh parseStl(std::string_view bytes, const std::string& name_for_errors);
 // glTF 2.0 as JSON or GLB. `folder`: where its external buffers may lie; empty: they are refused.
 Mesh parseGltf(std::string_view bytes, const std::string& name_for_errors, const std::filesystem::path& folder = {});
 
+// A mesh with named shapes of it: glTF's morph targets.
+struct ShapedMesh {
+  Mesh mesh;
+  std::vector<std::string> names;          // of each shape, in order of first appearance in the file; none is empty
+  std::vector<VertexPositions> positions;  // one per name: #V by 3, where that shape at weight 1 puts the vertices
+};
+// As parseGltf(), with the morph targets: shapes of one name in several meshes are one; targets without a name are called
+// "target 0", ... Throws InputError also when there are none, or two of one name in one mesh.
+ShapedMesh parseGltfShapes(std::string_view bytes, const std::string& name_for_errors,
+                           const std::filesystem::path& folder = {});
+ShapedMesh readGltfShapes(const std::filesystem::path& path);
+
 struct ObjOptions {
   std::string material_library;  // file name for mtllib; empty: none is named
   bool normals = false;          // smooth normals, one per vertex

@@ -42,7 +42,8 @@ FaceOnHead fitTo(const rig::Rig& rig) {
     const rig::CorrespondingPlace& place = fitted.dense[head.vertex_of_face[f]];
     out.known[f] = place.trust > kLeastTrust;
     Eigen::RowVector3d at = Eigen::RowVector3d::Zero();
-    for (std::size_t i = 0; i < 3; ++i) at += place.place.weights[i] * rig.neutral.positions.row(place.place.vertices[i]);
+    for (std::size_t i = 0; i < 3; ++i)
+      at += place.place.weights[i] * rig.neutral.positions.row(place.place.vertices[i]);
     out.positions.row(static_cast<Eigen::Index>(f)) = at;
   }
   return out;
@@ -88,9 +89,10 @@ bool facesInwards(const rig::VertexPositions& positions, const SkinTriangles& sk
   const rig::TargetSurface surface(positions, skin.triangles);
   double agreement = 0;
   for (std::size_t t = 0; t < face_triangles.size(); t += 7) {
-    const Eigen::Vector3d middle = (face.positions.row(face_triangles[t][0]) + face.positions.row(face_triangles[t][1]) +
-                                    face.positions.row(face_triangles[t][2])) /
-                                   3;
+    const Eigen::Vector3d middle =
+        (face.positions.row(face_triangles[t][0]) + face.positions.row(face_triangles[t][1]) +
+         face.positions.row(face_triangles[t][2])) /
+        3;
     const rig::SurfaceHit hit = surface.find(middle, Eigen::Vector3d::Zero(), -1, 1e300);
     if (hit.triangle >= 0) agreement += surface.normal(hit.triangle).dot(normalOf(face.positions, face_triangles[t]));
   }
@@ -102,7 +104,8 @@ void turnOver(SkinTriangles& skin) {
 }
 
 Eigen::Vector3d sampleOf(const rig::Rig& rig, const rig::SlitContact::Sample& s) {
-  return (1 - s.share_of_second) * rig.neutral.positions.row(s.first) + s.share_of_second * rig.neutral.positions.row(s.second);
+  return (1 - s.share_of_second) * rig.neutral.positions.row(s.first) +
+         s.share_of_second * rig.neutral.positions.row(s.second);
 }
 
 SurfacePoint pointOf(const rig::SlitContact::Sample& s) {
@@ -118,7 +121,8 @@ Correspondence correspondThroughGenericHead(const rig::Rig& source, const rig::R
   const auto generic_triangles = rig::triangulate(rig::genericHead().face);
   const auto both = trusted(generic_triangles, faces[0], faces[1]);
   if (both.empty())
-    throw rig::InputError("no place of the face was found on both heads; check their feature points with volto inspect --picture");
+    throw rig::InputError(
+        "no place of the face was found on both heads; check their feature points with volto inspect --picture");
 
   SkinTriangles source_skin = skinOf(source), target_skin = skinOf(target);
   if (facesInwards(source.neutral.positions, source_skin, faces[0], both)) turnOver(source_skin);
@@ -175,6 +179,49 @@ Correspondence correspondThroughGenericHead(const rig::Rig& source, const rig::R
   return c;
 }
 
+std::vector<bool> enclosedByCorrespondence(const rig::Mesh& mesh, const Correspondence& correspondence,
+                                           std::span<const std::uint32_t> same_as) {
+  const std::size_t vertices = mesh.vertexCount();
+  std::vector<bool> corresponds(vertices, false);
+  for (std::size_t v = 0; v < vertices; ++v) {
+    const auto& w = correspondence.source_point[v].weight;
+    corresponds[same_as[v]] = corresponds[same_as[v]] || w[0] != 0 || w[1] != 0 || w[2] != 0;
+  }
+  // Connected patches of what does not correspond, over edges of the welded mesh.
+  std::vector<std::uint32_t> patch(vertices);
+  for (std::uint32_t v = 0; v < vertices; ++v) patch[v] = v;
+  const auto root = [&](std::uint32_t v) {
+    while (patch[v] != v) v = patch[v] = patch[patch[v]];
+    return v;
+  };
+  std::vector<bool> meets(vertices, false);  // by root, afterwards: a corresponding neighbour
+  const auto triangles = rig::triangulate(mesh);
+  for (const auto& t : triangles)
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::uint32_t a = same_as[t[i]], b = same_as[t[(i + 1) % 3]];
+      if (!corresponds[a] && !corresponds[b]) patch[root(a)] = root(b);
+    }
+  for (const auto& t : triangles)
+    for (std::size_t i = 0; i < 3; ++i)
+      for (std::size_t j = 0; j < 3; ++j)
+        if (const std::uint32_t a = same_as[t[i]]; !corresponds[a] && corresponds[same_as[t[j]]]) meets[root(a)] = true;
+  // The largest in space of those on the face's skin is the rest of the head.
+  std::vector<Eigen::AlignedBox3d> box(vertices);
+  for (std::uint32_t v = 0; v < vertices; ++v)
+    if (!corresponds[same_as[v]]) box[root(same_as[v])].extend(mesh.positions.row(v).transpose());
+  double largest = -1;
+  std::uint32_t rest = 0;
+  for (std::uint32_t v = 0; v < vertices; ++v)
+    if (meets[v] && box[v].diagonal().norm() > largest) {
+      largest = box[v].diagonal().norm();
+      rest = v;
+    }
+  std::vector<bool> out(vertices, false);
+  for (std::uint32_t v = 0; v < vertices; ++v)
+    if (!corresponds[same_as[v]]) out[v] = meets[root(same_as[v])] && root(same_as[v]) != rest;
+  return out;
+}
+
 std::vector<SlitPair> slitPairs(const rig::Rig& source, const rig::Rig& target) {
   std::vector<SlitPair> pairs;
   const double size = target.fapu.fapu.eye_separation / source.fapu.fapu.eye_separation;
@@ -193,8 +240,10 @@ std::vector<SlitPair> slitPairs(const rig::Rig& source, const rig::Rig& target) 
         pair.source_upper = pointOf(s.upper[sk]);
         pair.source_lower = pointOf(s.lower[sk]);
         // An open slit closes when the source's does. Where one of the two is closed at rest there is no such ratio.
-        const double target_gap = (sampleOf(target, t.upper[tk]) - sampleOf(target, t.lower[tk])).norm() / target.fapu.fapu.eye_separation;
-        const double source_gap = (sampleOf(source, s.upper[sk]) - sampleOf(source, s.lower[sk])).norm() / source.fapu.fapu.eye_separation;
+        const double target_gap =
+            (sampleOf(target, t.upper[tk]) - sampleOf(target, t.lower[tk])).norm() / target.fapu.fapu.eye_separation;
+        const double source_gap =
+            (sampleOf(source, s.upper[sk]) - sampleOf(source, s.lower[sk])).norm() / source.fapu.fapu.eye_separation;
         const bool open = target_gap > 0.02 && source_gap > 0.02;
         pair.gap_scale = size * (open ? target_gap / source_gap : 1.0);
         pairs.push_back(pair);

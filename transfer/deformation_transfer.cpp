@@ -152,6 +152,7 @@ DeformationTransfer::DeformationTransfer(const rig::VertexPositions& source_neut
   if (correspondence.source_triangle.size() != target_triangles.size() ||
       correspondence.source_point.size() != vertices || (!same_as.empty() && same_as.size() != vertices) ||
       !(eye_separation > 0) ||
+      (!correspondence.anchor_share.empty() && correspondence.anchor_share.size() != vertices) ||
       (correspondence.displacement_scale.size() > 1 && correspondence.displacement_scale.size() != vertices))
     throw std::invalid_argument("DeformationTransfer: sizes do not fit together");
   s.source_neutral = source_neutral;
@@ -215,7 +216,11 @@ DeformationTransfer::DeformationTransfer(const rig::VertexPositions& source_neut
   for (std::size_t u = 0; u < area.size(); ++u) {
     const bool none = isNone(s.correspondence.source_point[s.vertex_of_unknown[u]]);
     // A vertex in no triangle needs its place too.
-    s.anchor[u] = (none ? options.hold : options.anchor) * unit * std::max(area[u], 1e-3 * mean_area);
+    const double share =
+        s.correspondence.anchor_share.empty() ? 1.0 : s.correspondence.anchor_share[s.vertex_of_unknown[u]];
+    // Some of it remains: a piece that hangs on nothing would have no place at all.
+    const double firmness = none ? options.hold : options.anchor * std::max(share, 1e-4);
+    s.anchor[u] = firmness * unit * std::max(area[u], 1e-3 * mean_area);
     entries.emplace_back(static_cast<int>(u), static_cast<int>(u), s.anchor[u]);
   }
   for (const SlitPair& pair : s.pairs) {

@@ -32,6 +32,9 @@ struct Correspondence {
       source_triangle;  // one per triangle of rig::triangulate(target): index into rig::triangulate(source), or kNone
   std::vector<SurfacePoint>
       source_point;  // one per target vertex; all weights zero: none, the vertex is anchored where it is
+  // How firmly each target vertex is held where its displacement puts it, as a share of the anchor: 0 follows its
+  // neighbours alone. One per target vertex, or none: all 1.
+  std::vector<double> anchor_share;
   Eigen::Matrix3d target_from_source = Eigen::Matrix3d::Identity();  // rotation R
   // How much longer a displacement is on the target, along the axes of the head; one row per target vertex, or a single
   // one for all.

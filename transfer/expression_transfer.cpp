@@ -10,6 +10,7 @@
 #include "rig/parallel.h"
 #include "rig/weld.h"
 #include "transfer/correspondence.h"
+#include "transfer/lining.h"
 #include "transfer/mask_transfer.h"
 #include "transfer/part_transfer.h"
 
@@ -92,6 +93,7 @@ struct ExpressionTransfer::State {
   bool same;
   MaskTransfer mask;
   std::optional<PartTransfer> parts;  // where the meshes differ
+  std::optional<Lining> lining;       // there too
   std::optional<DeformationTransfer> deformation;
   Eigen::Matrix3d source_from_target = Eigen::Matrix3d::Identity();
   std::vector<Float3> source_neutral, target_neutral;
@@ -99,13 +101,17 @@ struct ExpressionTransfer::State {
   double seconds = 0;
 
   State(const rig::Rig& s, const rig::Rig& t)
-      : source(s), target(t), same(transfer::sameMesh(s.neutral, t.neutral)), mask(s, t),
-        source_neutral(toFloat(s.neutral.positions)), target_neutral(toFloat(t.neutral.positions)) {
+      : source(s),
+        target(t),
+        same(transfer::sameMesh(s.neutral, t.neutral)),
+        mask(s, t),
+        source_neutral(toFloat(s.neutral.positions)),
+        target_neutral(toFloat(t.neutral.positions)) {
     if (!same) parts.emplace(s, t);
   }
 
-  // The source's vertices, and after them the target's as the mask has them, turned into the source's frame: what of the
-  // target corresponds to nothing of the source takes its deformation from there.
+  // The source's vertices, and after them the target's as the mask has them, turned into the source's frame: what of
+  // the target corresponds to nothing of the source takes its deformation from there.
   rig::VertexPositions stacked(const rig::VertexPositions& of_source, const rig::VertexPositions& by_mask) const {
     rig::VertexPositions all(of_source.rows() + by_mask.rows(), 3);
     all.topRows(of_source.rows()) = of_source;
@@ -113,8 +119,8 @@ struct ExpressionTransfer::State {
     return all;
   }
 
-  // Lids along the eyeball, lips and lids on their own side. On the same mesh, what the artist let pass on the source may
-  // pass on the target: an example's own lids lie on its eyeball as closely as it was made.
+  // Lids along the eyeball, lips and lids on their own side. On the same mesh, what the artist let pass on the source
+  // may pass on the target: an example's own lids lie on its eyeball as closely as it was made.
   void resolve(const rig::VertexPositions& example, rig::VertexPositions& result) const {
     if (target.contacts.empty()) return;
     rig::VertexPositions moved = outOfContact(target.contacts, target_neutral, result);
@@ -139,7 +145,17 @@ struct ExpressionTransfer::State {
     std::vector<Triangle> all_triangles = source_triangles;
     rig::VertexPositions all_positions = source.neutral.positions;
     for (const SurfacePoint& p : c.source_point) corresponding += isNone(p) ? 0U : 1U;
+    const std::vector<std::uint32_t> weld = weldOf(target);
     if (!same) {
+      const std::vector<bool> enclosed = enclosedByCorrespondence(target.neutral, c, weld);
+      c.anchor_share.assign(enclosed.size(), 1.0);
+      for (std::size_t v = 0; v < enclosed.size(); ++v)
+        if (enclosed[v]) c.anchor_share[v] = 0;
+      std::vector<Triangle> skin;
+      for (const Triangle& t : target_triangles)
+        if (std::none_of(t.begin(), t.end(), [&](std::uint32_t v) { return isNone(c.source_point[v]); }))
+          skin.push_back(t);
+      lining.emplace(target, enclosed, std::move(skin));
       const auto offset = static_cast<std::uint32_t>(source.neutral.vertexCount());
       for (const Triangle& t : target_triangles) all_triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
       all_positions = stacked(source.neutral.positions, target.neutral.positions);
@@ -151,8 +167,8 @@ struct ExpressionTransfer::State {
         c.displacement_scale[v].setOnes();
       }
     }
-    deformation.emplace(all_positions, all_triangles, target.neutral.positions, target_triangles, weldOf(target),
-                        std::move(c), slitPairs(source, target), target.fapu.fapu.eye_separation,
+    deformation.emplace(all_positions, all_triangles, target.neutral.positions, target_triangles, weld, std::move(c),
+                        slitPairs(source, target), target.fapu.fapu.eye_separation,
                         DeformationTransferOptions{.threads = threads});
   }
 };
@@ -174,8 +190,7 @@ std::vector<rig::VertexPositions> ExpressionTransfer::transfer(std::span<const r
       throw std::invalid_argument("ExpressionTransfer: an example with another number of vertices than the source");
   std::vector<rig::VertexPositions> results(examples.size());
   const bool by_mask = !s.deformation || !s.same;
-  if (by_mask)
-    rig::parallelFor(examples.size(), [&](std::size_t i) { results[i] = s.mask.transfer(examples[i]); });
+  if (by_mask) rig::parallelFor(examples.size(), [&](std::size_t i) { results[i] = s.mask.transfer(examples[i]); });
   if (s.deformation && s.same) results = s.deformation->transfer(examples);
   if (s.deformation && !s.same) {
     std::vector<rig::VertexPositions> all(examples.size());
@@ -184,6 +199,7 @@ std::vector<rig::VertexPositions> ExpressionTransfer::transfer(std::span<const r
   }
   rig::parallelFor(examples.size(), [&](std::size_t i) {
     s.resolve(examples[i], results[i]);
+    if (s.lining) s.lining->keepBehind(results[i]);
     if (s.parts) s.parts->apply(examples[i], results[i]);
   });
   return results;

@@ -12,10 +12,12 @@
 namespace volto::transfer {
 
 enum class Method {
-  // By the control mask (transfer/mask_transfer.h). Smooth, and as fine as the mask: it cannot carry a wrinkle between its
+  // By the control mask (transfer/mask_transfer.h). Smooth, and as fine as the mask: it cannot carry a wrinkle between
+  // its
   // points. Needs nothing to correspond but the feature points: heads of any kind.
   mask,
-  // By deformation gradients (transfer/deformation_transfer.h). Carries all detail of the examples, where a place of the
+  // By deformation gradients (transfer/deformation_transfer.h). Carries all detail of the examples, where a place of
+  // the
   // source's face corresponds to each of the target's; the mask elsewhere. For faces that are built alike.
   deformation,
 };
@@ -33,14 +35,14 @@ class ExpressionTransfer {
   ExpressionTransfer(const ExpressionTransfer&) = delete;
   ExpressionTransfer& operator=(const ExpressionTransfer&) = delete;
 
-  // One per example, #V by 3 of the target, its order, frame and unit. `examples`: #V by 3 of the source. An example equal
-  // to the source's neutral gives the target's, to rounding. The same bits whatever the number of threads. Throws
+  // One per example, #V by 3 of the target, its order, frame and unit. `examples`: #V by 3 of the source. An example
+  // equal to the source's neutral gives the target's, to rounding. The same bits whatever the number of threads. Throws
   // std::invalid_argument for an example of another size.
   std::vector<rig::VertexPositions> transfer(std::span<const rig::VertexPositions> examples) const;
 
   // For people.
   bool sameMesh() const;
-  std::size_t maskPoints() const;            // of the target
+  std::size_t maskPoints() const;             // of the target
   std::size_t correspondingVertices() const;  // of the target; method deformation alone
   double secondsToPrepare() const;
 

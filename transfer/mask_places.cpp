@@ -31,7 +31,8 @@ std::vector<Split> splitsOf(const rig::RefinedMask& mask) {
     std::vector<std::size_t> fan;
     for (const std::size_t t : around[p])
       if (!gone[t]) fan.push_back(t);
-    if (fan.size() != 3) throw std::invalid_argument("the refined mask's triangles are no subdivision of the control mask");
+    if (fan.size() != 3)
+      throw std::invalid_argument("the refined mask's triangles are no subdivision of the control mask");
     // The corners of the first triangle, with the new point replaced by the corner that is in both others.
     Triangle whole = triangles[fan[0]];
     std::uint16_t opposite = whole[0];
@@ -117,7 +118,8 @@ MaskInterpolation::Row MaskInterpolation::at(const MaskPlace& place) const {
   double least = -std::numeric_limits<double>::infinity();
   for (const Piece& piece : pieces_[place.triangle]) {
     Eigen::Matrix3d corners;
-    for (int i = 0; i < 3; ++i) corners.col(i) = Eigen::Map<const Eigen::Vector3d>(piece.corner[static_cast<std::size_t>(i)].data());
+    for (int i = 0; i < 3; ++i)
+      corners.col(i) = Eigen::Map<const Eigen::Vector3d>(piece.corner[static_cast<std::size_t>(i)].data());
     const Eigen::Vector3d w = corners.inverse() * b;
     if (!w.allFinite() || w.minCoeff() <= least) continue;
     least = w.minCoeff();  // the piece that holds it, or the nearest to that by rounding

@@ -51,8 +51,8 @@ MaskTransfer::MaskTransfer(const rig::Rig& source, const rig::Rig& target)
       for (std::size_t i = 0; i < 3; ++i) r.vertex[i] = vertexOf(on_source, row.point[i], source.neutral.positions);
       r.weight = row.weight;
     }
-    r.target_from_source = target.mesh_from_head * fapuRatio(source, target, places[p]).asDiagonal() *
-                           source.mesh_from_head.transpose();
+    r.target_from_source =
+        target.mesh_from_head * fapuRatio(source, target, places[p]).asDiagonal() * source.mesh_from_head.transpose();
   }
 }
 

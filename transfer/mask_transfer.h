@@ -1,6 +1,6 @@
-// Expressions carried by the control mask: the examples' displacement at the mask's points, in FAPU of the source, times
-// FAPU of the target, and from there to every vertex by the target's own regions of influence. Queiroz, Braun, Musse,
-// section V, equations 1 and 2.
+// Expressions carried by the control mask: the examples' displacement at the mask's points, in FAPU of the source,
+// times FAPU of the target, and from there to every vertex by the target's own regions of influence. Queiroz, Braun,
+// Musse, section V, equations 1 and 2.
 #pragma once
 
 #include <vector>

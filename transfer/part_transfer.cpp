@@ -1,36 +1,12 @@
 #include "transfer/part_transfer.h"
 
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 
 #include "rig/closest_point.h"
+#include "rig/rigid_motion.h"
 
 namespace volto::transfer {
 namespace {
-
-// Rotation and shift that take the vertices from one place to another best (Kabsch).
-struct RigidMotion {
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero(), shift = Eigen::Vector3d::Zero();
-};
-RigidMotion motionOf(const std::vector<std::uint32_t>& vertices, const rig::VertexPositions& from,
-                     const rig::VertexPositions& to) {
-  RigidMotion m;
-  Eigen::Vector3d moved = Eigen::Vector3d::Zero();
-  const double n = static_cast<double>(vertices.size());
-  for (const std::uint32_t v : vertices) {
-    m.centre += from.row(v).transpose() / n;
-    moved += to.row(v).transpose() / n;
-  }
-  m.shift = moved - m.centre;
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  for (const std::uint32_t v : vertices)
-    covariance += (to.row(v).transpose() - moved) * (from.row(v).transpose() - m.centre).transpose();
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d sign(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1);
-  m.rotation = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
-  return m;
-}
 
 // Two axes in the triangle, one off it; orthonormal, so that lashes do not stretch with the lid.
 Eigen::Matrix3d frameOf(const rig::VertexPositions& p, const std::array<std::uint32_t, 3>& t) {
@@ -44,7 +20,8 @@ Eigen::Matrix3d frameOf(const rig::VertexPositions& p, const std::array<std::uin
   return frame;
 }
 
-Eigen::Vector3d at(const rig::VertexPositions& p, const std::array<std::uint32_t, 3>& t, const std::array<double, 3>& w) {
+Eigen::Vector3d at(const rig::VertexPositions& p, const std::array<std::uint32_t, 3>& t,
+                   const std::array<double, 3>& w) {
   return w[0] * p.row(t[0]).transpose() + w[1] * p.row(t[1]).transpose() + w[2] * p.row(t[2]).transpose();
 }
 
@@ -85,7 +62,7 @@ void PartTransfer::apply(const rig::VertexPositions& example, rig::VertexPositio
   const Eigen::Matrix3d turn = target_.mesh_from_head * source_.mesh_from_head.transpose();
   const double size = target_.fapu.fapu.eye_separation / source_.fapu.fapu.eye_separation;
   for (const Turning& t : turning_) {
-    const RigidMotion on_source = motionOf(t.source, source_.neutral.positions, example);
+    const rig::RigidMotion on_source = rig::bestRigidMotion(t.source, source_.neutral.positions, example);
     const Eigen::Matrix3d rotation = turn * on_source.rotation * turn.transpose();
     const Eigen::Vector3d shift = size * (turn * on_source.shift);
     Eigen::Vector3d centre = Eigen::Vector3d::Zero();

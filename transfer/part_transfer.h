@@ -1,5 +1,5 @@
-// What does not deform as skin does, on a target whose parts are not the source's: eyeballs, lower teeth and tongue turn
-// and shift as the source's do; lashes and brows ride on the skin under them.
+// What does not deform as skin does, on a target whose parts are not the source's: eyeballs, lower teeth and tongue
+// turn and shift as the source's do; lashes and brows ride on the skin under them.
 #pragma once
 
 #include <vector>
@@ -13,8 +13,8 @@ class PartTransfer {
  public:
   PartTransfer(const rig::Rig& source, const rig::Rig& target);
 
-  // Moves the parts of `result` (#V of the target, its skin in place). What the source has no part for stays as it is in
-  // `result`.
+  // Moves the parts of `result` (#V of the target, its skin in place). What the source has no part for stays as it is
+  // in `result`.
   void apply(const rig::VertexPositions& example, rig::VertexPositions& result) const;
 
  private:

@@ -226,5 +226,32 @@ TEST(Gltf, VerticesThatSayWhichTheyWereArePutBackTogether) {
   EXPECT_EQ(parseGltf(glb(json, bytes.replace(48, 4, bytesOf(0.0F))), "m").vertexCount(), 4U);
 }
 
+// Two triangles' worth of bytes: positions, indices, texture coordinates; the positions serve as a target's displacement too.
+TEST(Gltf, MorphTargetsAreShapesByTheirNames) {
+  std::string text = document(R"({"mesh":0,"scale":[2,2,2]})");
+  text = replaced(text, R"("material":0}])", R"("material":0,"targets":[{"POSITION":0},{"POSITION":0,"NORMAL":0},{}]}],"extras":{"targetNames":["smile","open"]})");
+  const ShapedMesh read = parseGltfShapes(glb(text, triangleBytes()), "m");
+  EXPECT_EQ(read.names, (std::vector<std::string>{"smile", "open", "target 2"}));
+  ASSERT_EQ(read.positions.size(), 3U);
+  EXPECT_EQ(read.positions[0], VertexPositions(2 * read.mesh.positions)) << "the node's scale counts for displacements too";
+  EXPECT_EQ(read.positions[1], read.positions[0]);
+  EXPECT_EQ(read.positions[2], read.mesh.positions);
+}
+
+TEST(Gltf, MorphTargetsThatAreNoneAreRefused) {
+  const auto shapes = [](const std::string& text) {
+    return test::complaintOf([&] { parseGltfShapes(glb(text, triangleBytes()), "head.glb"); });
+  };
+  const std::string whole = document(R"({"mesh":0})");
+  EXPECT_EQ(shapes(whole), "head.glb: has no morph targets; export it with its shape keys");
+  const auto with = [&](const std::string& targets, const std::string& names) {
+    return replaced(whole, R"("material":0}])", R"("material":0,"targets":)" + targets + R"(}],"extras":{"targetNames":)" + names + "}");
+  };
+  EXPECT_NE(shapes(with(R"([{"POSITION":0},{"POSITION":0}])", R"(["a","a"])")).find("are called 'a'"), std::string::npos);
+  EXPECT_NE(shapes(with(R"([{"POSITION":2}])", R"(["a"])")).find("does not hold 3 numbers"), std::string::npos);
+  EXPECT_NE(shapes(with(R"([{"POSITION":-1}])", R"(["a"])")).find("no accessor"), std::string::npos);
+  EXPECT_NE(shapes(with(R"([7])", R"(["a"])")).find("no object"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace volto::rig

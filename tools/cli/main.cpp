@@ -28,12 +28,14 @@ constexpr Verb kVerbs[] = {
     {"replay", "play a recorded performance on a character and publish it", defineReplay},
     {"record", "record what an endpoint publishes into a take", defineRecord},
     {"bake", "play a performance on a character into OBJ, GLB, CSV or PNG files", defineBake},
+    {"animate", "play a written script on a character: to subscribers or into files", defineAnimate},
     {"export", "a character for other programs: GLB with morph targets, or OBJ files", defineExport},
     {"track", "turn a performance into blendshape weights, without a character", defineTrack},
     {"inspect", "say what a rig, take, mesh or CSV file holds and how healthy it is", defineInspect},
     {"cameras", "list the cameras and what they can do; try one", defineCameras},
     {"doctor", "say which models are there, which are missing and how to get them", defineDoctor},
     {"transfer", "one character's expressions on another's face", defineTransfer},
+    {"import", "give a character blendshapes of its own: from meshes or morph targets", defineImport},
     {"evaluate", "compare a set of expression meshes with what it should be", defineEvaluate},
 };
 

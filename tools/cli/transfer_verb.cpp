@@ -38,14 +38,17 @@ transfer::Method methodOf(const std::string& name) {
   if (name == "mask") return transfer::Method::mask;
   if (name == "deformation") return transfer::Method::deformation;
   if (name == "individual")
-    throw CommandError(kWrongUsage, "--method individual: how a character of its own smiles is not learnt yet; use mask or deformation");
+    throw CommandError(
+        kWrongUsage,
+        "--method individual: how a character of its own smiles is not learnt yet; use mask or deformation");
   throw CommandError(kWrongUsage, "--method " + name + ": there is no such method; use mask or deformation");
 }
 
 rig::Rig readCharacter(const std::string& path) {
   requireReadable(path);
   if (rig::isMeshFileName(path))
-    throw CommandError(kBadData, path + ": is a mesh that is not rigged; make its rig with volto rig " + path + " -o C.rig");
+    throw CommandError(kBadData,
+                       path + ": is a mesh that is not rigged; make its rig with volto rig " + path + " -o C.rig");
   return rig::readRig(path);
 }
 
@@ -58,10 +61,12 @@ int run(const Options& options) {
   const transfer::Method method = methodOf(options.method);
   const rig::Rig source = readCharacter(options.source), target = readCharacter(options.target);
   if (!std::filesystem::is_directory(options.examples))
-    throw CommandError(kNoInput, options.examples + ": no such folder; it holds one mesh per expression of " + options.source);
+    throw CommandError(kNoInput,
+                       options.examples + ": no such folder; it holds one mesh per expression of " + options.source);
   std::error_code error;
   if (std::filesystem::equivalent(options.examples, options.output, error))
-    throw CommandError(kWrongUsage, options.output + ": is the folder of the examples, which would be lost; give another");
+    throw CommandError(kWrongUsage,
+                       options.output + ": is the folder of the examples, which would be lost; give another");
 
   auto start = Clock::now();
   const transfer::MeshSet examples = transfer::readMeshSet(options.examples, source.neutral, options.threads);
@@ -96,7 +101,8 @@ int run(const Options& options) {
                 transfer.correspondingVertices(), target.neutral.vertexCount());
   std::printf("time: read %.2f s, prepare %.2f s, transfer %.2f s, write %.2f s\n", reading, preparing, computing,
               secondsSince(start));
-  for (const std::string& name : still) std::printf("note: %s does not move on the source: empty on the target too\n", name.c_str());
+  for (const std::string& name : still)
+    std::printf("note: %s does not move on the source: empty on the target too\n", name.c_str());
   return kDone;
 }
 
@@ -114,12 +120,15 @@ RunVerb defineTransfer(CLI::App& app) {
   app.add_option("--target", options->target, "the character that gets them, made by volto rig")
       ->required()
       ->type_name("T.rig");
-  app.add_option("-o,--output", options->output, "folder for one OBJ per expression: the target's vertices in its own order")
+  app.add_option("-o,--output", options->output,
+                 "folder for one OBJ per expression: the target's vertices in its own order")
       ->required()
       ->type_name("DIR");
-  app.add_option("--method", options->method,
-                 "deformation (default): every wrinkle of the examples, for faces that are built alike; or mask: through the control "
-                 "mask's points, smooth, for any two faces, however unlike; finer when both were rigged with --subdivide")
+  app.add_option(
+         "--method", options->method,
+         "deformation (default): every wrinkle of the examples, for faces that are built alike; or mask: through the "
+         "control "
+         "mask's points, smooth, for any two faces, however unlike; finer when both were rigged with --subdivide")
       ->type_name("mask|deformation");
   app.add_option("--threads", options->threads, "how many to use (default: every core)")->check(CLI::Range(1, 64));
   app.add_flag("--quiet", options->quiet, "print nothing");

@@ -25,12 +25,14 @@ RunVerb defineRun(CLI::App& app);
 RunVerb defineReplay(CLI::App& app);
 RunVerb defineRecord(CLI::App& app);
 RunVerb defineBake(CLI::App& app);
+RunVerb defineAnimate(CLI::App& app);
 RunVerb defineExport(CLI::App& app);
 RunVerb defineTrack(CLI::App& app);
 RunVerb defineInspect(CLI::App& app);
 RunVerb defineCameras(CLI::App& app);
 RunVerb defineDoctor(CLI::App& app);
 RunVerb defineTransfer(CLI::App& app);
+RunVerb defineImport(CLI::App& app);
 RunVerb defineEvaluate(CLI::App& app);
 
 // In the order a person meets them.

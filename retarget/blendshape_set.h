@@ -1,0 +1,23 @@
+// A character's own set of blendshapes, made from meshes: an artist's, another program's, or what a transfer came to.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "rig/rig.h"
+
+namespace volto::retarget {
+
+// Replaces the rig's blendshapes, combinations and part motions by the shapes given: at weight 1 a shape puts the
+// vertices where its mesh has them (to single precision; but for contacts, which are kept). The motion of the mask is
+// read off the mesh at the feature points, so that a live face finds its weights on this set. Eyeballs turn about their
+// centres as the meshes turn them.
+//
+// `positions`: one per name, #V by 3, mesh frame and unit. Throws rig::InputError: no shapes, a name empty, twice or
+// longer than 200 bytes, a mesh of another number of vertices, a position that is not finite. Shapes that do not move
+// are kept. Returns the names of those.
+std::vector<std::string> replaceBlendshapes(rig::Rig& rig, std::span<const std::string> names,
+                                            std::span<const rig::VertexPositions> positions);
+
+}  // namespace volto::retarget

@@ -1,0 +1,103 @@
+// volto import: a character gets a set of blendshapes of its own, from meshes or from a glTF file's morph targets.
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "retarget/blendshape_set.h"
+#include "rig/mesh_io.h"
+#include "rig/rig_file.h"
+#include "tools/cli/exit_status.h"
+#include "tools/cli/output_file.h"
+#include "tools/cli/read_input.h"
+#include "tools/cli/verb.h"
+#include "transfer/mesh_set.h"
+
+namespace volto::cli {
+namespace {
+
+struct Options {
+  std::string shapes, rig, output;
+  bool quiet = false;
+};
+
+bool isGltf(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return extension == ".glb" || extension == ".gltf";
+}
+
+struct Shapes {
+  std::vector<std::string> names;
+  std::vector<rig::VertexPositions> positions;
+};
+
+Shapes fromFolder(const Options& options, const rig::Mesh& neutral) {
+  transfer::MeshSet set = transfer::readMeshSet(options.shapes, neutral);
+  Shapes out{std::move(set.names), std::move(set.positions)};
+  // The face at rest lies beside its expressions in many folders (volto export writes it there): it is no shape.
+  const auto rest = std::find(out.names.begin(), out.names.end(), "neutral");
+  if (rest != out.names.end()) {
+    out.positions.erase(out.positions.begin() + (rest - out.names.begin()));
+    out.names.erase(rest);
+  }
+  return out;
+}
+
+Shapes fromGltf(const Options& options, const rig::Mesh& neutral) {
+  requireReadable(options.shapes);
+  rig::ShapedMesh read = rig::readGltfShapes(options.shapes);
+  rig::requireSameTopology(neutral, read.mesh, options.shapes);
+  // Displacements count: the file may have been written from other software's rounding of the same neutral.
+  for (rig::VertexPositions& shape : read.positions) shape += neutral.positions - read.mesh.positions;
+  return {std::move(read.names), std::move(read.positions)};
+}
+
+int run(const Options& options) {
+  requireReadable(options.rig);
+  requireReplaceable(options.output);
+  const bool folder = std::filesystem::is_directory(options.shapes);
+  if (!folder && !isGltf(options.shapes)) {
+    requireReadable(options.shapes);
+    throw CommandError(kBadData,
+                       options.shapes + ": give a folder of meshes, or a .glb or .gltf file with morph targets");
+  }
+  rig::Rig rig = rig::readRig(options.rig);
+  const Shapes shapes = folder ? fromFolder(options, rig.neutral) : fromGltf(options, rig.neutral);
+  std::vector<std::string> still;
+  try {
+    still = retarget::replaceBlendshapes(rig, shapes.names, shapes.positions);
+  } catch (const rig::InputError& error) {
+    throw rig::InputError(options.shapes + ": " + error.what());
+  }
+  rig::writeRig(options.output, rig);
+  if (options.quiet) return kDone;
+  std::printf("%zu blendshapes: %s\n", rig.blendshapes.size(), options.output.c_str());
+  for (const std::string& name : still) std::printf("note: %s moves nothing; kept as an empty shape\n", name.c_str());
+  for (const rig::Blendshape& shape : rig.blendshapes)
+    if (!shape.moves_mask && std::find(still.begin(), still.end(), shape.name) == still.end())
+      std::printf("note: %s moves none of the 84 points; a live face cannot drive it\n", shape.name.c_str());
+  return kDone;
+}
+
+}  // namespace
+
+RunVerb defineImport(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  app.add_option("shapes", options->shapes,
+                 "folder of meshes, one per shape, with the character's vertices in its order (what volto transfer and "
+                 "volto export "
+                 "write); or a GLB or glTF file with named morph targets of the same mesh")
+      ->required()
+      ->type_name("DIR|F.glb");
+  app.add_option("--rig", options->rig, "the character that gets them")->required()->type_name("C.rig");
+  app.add_option("-o,--output", options->output, "the character with its new set; may be C.rig itself")
+      ->required()
+      ->type_name("D.rig");
+  app.add_flag("--quiet", options->quiet, "print nothing");
+  return [options] { return run(*options); };
+}
+
+}  // namespace volto::cli

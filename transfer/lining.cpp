@@ -1,0 +1,58 @@
+#include "transfer/lining.h"
+
+#include <cmath>
+
+#include <Eigen/Geometry>
+
+#include "rig/closest_point.h"
+
+namespace volto::transfer {
+namespace {
+
+constexpr double kDeepestEs = 0.2;
+constexpr double kLeastForward = 0.5;  // cosine between the skin's normal and the face's direction
+constexpr double kNearest = 0.1;       // of the depth at rest
+
+Eigen::Vector3d normalOf(const rig::VertexPositions& p, const std::array<std::uint32_t, 3>& t) {
+  const Eigen::Vector3d a = p.row(t[0]), b = p.row(t[1]), c = p.row(t[2]);
+  const Eigen::Vector3d n = (b - a).cross(c - a);
+  const double length = n.norm();
+  return length > 0 ? Eigen::Vector3d(n / length) : Eigen::Vector3d::Zero();
+}
+
+}  // namespace
+
+Lining::Lining(const rig::Rig& rig, const std::vector<bool>& inside, std::vector<std::array<std::uint32_t, 3>> skin) {
+  const rig::VertexPositions& neutral = rig.neutral.positions;
+  const rig::ClosestPoint nearest(neutral, std::move(skin));
+  if (nearest.empty()) return;
+  const Eigen::Vector3d forward = rig.mesh_from_head.col(2);
+  const double limit = kDeepestEs * rig.fapu.fapu.eye_separation;
+  for (std::uint32_t v = 0; v < inside.size(); ++v) {
+    if (!inside[v]) continue;
+    const Eigen::Vector3d here = neutral.row(v);
+    const rig::SurfacePoint on = nearest.find(here, limit);
+    if (on.triangle < 0) continue;
+    Vertex lining{v, nearest.triangle(on.triangle), on.barycentric};
+    const Eigen::Vector3d normal = normalOf(neutral, lining.skin);
+    const double facing = normal.dot(forward);
+    if (std::abs(facing) < kLeastForward) continue;
+    lining.side = facing > 0 ? 1 : -1;
+    Eigen::Vector3d place = Eigen::Vector3d::Zero();
+    for (std::size_t i = 0; i < 3; ++i) place += lining.weight[i] * neutral.row(lining.skin[i]).transpose();
+    lining.depth = -lining.side * normal.dot(here - place);
+    if (lining.depth > 0.5 * on.distance && lining.depth > 0) vertices_.push_back(lining);
+  }
+}
+
+void Lining::keepBehind(rig::VertexPositions& positions) const {
+  for (const Vertex& l : vertices_) {
+    Eigen::Vector3d place = Eigen::Vector3d::Zero();
+    for (std::size_t i = 0; i < 3; ++i) place += l.weight[i] * positions.row(l.skin[i]).transpose();
+    const Eigen::Vector3d outwards = l.side * normalOf(positions, l.skin);
+    const double depth = -outwards.dot(positions.row(l.vertex).transpose() - place);
+    if (depth < kNearest * l.depth) positions.row(l.vertex) -= ((kNearest * l.depth - depth) * outwards).transpose();
+  }
+}
+
+}  // namespace volto::transfer
