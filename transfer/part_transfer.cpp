@@ -44,9 +44,13 @@ PartTransfer::PartTransfer(const rig::Rig& source, const rig::Rig& target) : sou
     if (!part[t[0]]) skin.push_back(t);
   const rig::ClosestPoint nearest(target.neutral.positions, std::move(skin));
   if (nearest.empty()) return;
+  // Lashes ride on their lid, as contacts have it (rig/contacts.h).
+  std::vector<bool> on_lid(target.neutral.vertexCount(), false);
+  for (const rig::Rider& rider : target.contacts.riders) on_lid[rider.vertex] = true;
   for (const rig::RigidPart& p : target.rigid_parts) {
     if (p.follows != Follows::skin) continue;
     for (const std::uint32_t v : p.vertices) {
+      if (on_lid[v]) continue;
       const Eigen::Vector3d here = target.neutral.positions.row(v);
       const rig::SurfacePoint on = nearest.find(here);
       if (on.triangle < 0) continue;

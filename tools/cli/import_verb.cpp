@@ -13,6 +13,7 @@
 #include "tools/cli/output_file.h"
 #include "tools/cli/read_input.h"
 #include "tools/cli/verb.h"
+#include "transfer/matched_shapes.h"
 #include "transfer/mesh_set.h"
 
 namespace volto::cli {
@@ -49,10 +50,8 @@ Shapes fromFolder(const Options& options, const rig::Mesh& neutral) {
 Shapes fromGltf(const Options& options, const rig::Mesh& neutral) {
   requireReadable(options.shapes);
   rig::ShapedMesh read = rig::readGltfShapes(options.shapes);
-  rig::requireSameTopology(neutral, read.mesh, options.shapes);
-  // Displacements count: the file may have been written from other software's rounding of the same neutral.
-  for (rig::VertexPositions& shape : read.positions) shape += neutral.positions - read.mesh.positions;
-  return {std::move(read.names), std::move(read.positions)};
+  std::vector<rig::VertexPositions> positions = transfer::matchedShapes(neutral, read, options.shapes);
+  return {std::move(read.names), std::move(positions)};
 }
 
 int run(const Options& options) {
