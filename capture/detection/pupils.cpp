@@ -25,18 +25,19 @@ struct Column {
 }  // namespace
 
 PupilFinder::PupilFinder()
-    : grey_(static_cast<std::size_t>(3 * kWidth * kHeight)), open_(static_cast<std::size_t>(kWidth * kHeight)) {
-  const int reach = static_cast<int>(std::ceil(kRingRadius));
-  for (int y = -reach; y <= reach; ++y) {
-    for (int x = -reach; x <= reach; ++x) {
-      const double r = std::hypot(x, y);
-      if (r <= kIrisRadius) {
-        disc_.push_back({x, y});
-      } else if (r <= kRingRadius) {
-        ring_.push_back({x, y});
-      }
-    }
-  }
+    : grey_(static_cast<std::size_t>(3 * kWidth * kHeight)),
+      seen_(static_cast<std::size_t>(kHeight * (kWidth + 1))),
+      bright_(static_cast<std::size_t>(kHeight * (kWidth + 1))) {
+  const auto halfWidths = [](double radius) {
+    std::vector<int> out;
+    const int reach = static_cast<int>(std::floor(radius));
+    for (int y = -reach; y <= reach; ++y)
+      out.push_back(static_cast<int>(std::floor(std::sqrt(radius * radius - y * y))));
+    return out;
+  };
+  disc_ = halfWidths(kIrisRadius);
+  ring_ = halfWidths(kRingRadius);
+  for (const int half : disc_) disc_pixels_ += 2 * half + 1;
 }
 
 void PupilFinder::find(const Image& image, LandmarkFrame& frame) {
@@ -93,33 +94,43 @@ Pupil PupilFinder::findOne(const Image& image, std::span<const std::array<float,
   constexpr std::size_t kPlane = kWidth * kHeight;
   for (std::size_t i = 0; i < kPlane; ++i)  // the red channel shows lids bright and the iris dark in every skin
     grey_[i] = 0.2F * grey_[i] + 0.4F * grey_[i + kPlane] + 0.4F * grey_[i + 2 * kPlane];
+  // Sums along each row, from its start up to each pixel: a disc is a few rows of pixels side by side.
   for (int y = 0; y < kHeight; ++y) {
+    float seen = 0, bright = 0;
     for (int x = 0; x < kWidth; ++x) {
       const Column& column = columns[static_cast<std::size_t>(x)];
       const auto at = static_cast<float>(y) + 0.5F;
-      open_[static_cast<std::size_t>(y * kWidth + x)] =
-          std::clamp(std::min(at - column.top, column.bottom - at) + 0.5F, 0.0F, 1.0F);
+      const float open = std::clamp(std::min(at - column.top, column.bottom - at) + 0.5F, 0.0F, 1.0F);
+      seen += open;
+      bright += open * grey_[static_cast<std::size_t>(y * kWidth + x)];
+      const auto i = static_cast<std::size_t>(y * (kWidth + 1) + x + 1);
+      seen_[i] = seen;
+      bright_[i] = bright;
     }
   }
 
+  struct Sum {
+    float seen = 0, bright = 0;
+  };
+  const auto sumOver = [&](int cx, int cy, const std::vector<int>& half_widths) {
+    Sum sum;
+    const int reach = static_cast<int>(half_widths.size()) / 2;
+    for (int y = std::max(cy - reach, 0); y <= std::min(cy + reach, kHeight - 1); ++y) {
+      const int half = half_widths[static_cast<std::size_t>(y - cy + reach)];
+      const int first = std::max(cx - half, 0), end = std::min(cx + half + 1, kWidth);
+      if (first >= end) continue;
+      const auto row = static_cast<std::size_t>(y * (kWidth + 1));
+      sum.seen += seen_[row + static_cast<std::size_t>(end)] - seen_[row + static_cast<std::size_t>(first)];
+      sum.bright += bright_[row + static_cast<std::size_t>(end)] - bright_[row + static_cast<std::size_t>(first)];
+    }
+    return sum;
+  };
   const auto contrastAt = [&](int cx, int cy) {
-    const auto meanOf = [&](const std::vector<Tap>& taps, float& weight) {
-      float sum = 0;
-      weight = 0;
-      for (const Tap& tap : taps) {
-        const int x = cx + tap.x, y = cy + tap.y;
-        if (x < 0 || y < 0 || x >= kWidth || y >= kHeight) continue;
-        const auto i = static_cast<std::size_t>(y * kWidth + x);
-        sum += open_[i] * grey_[i];
-        weight += open_[i];
-      }
-      return weight > 0 ? sum / weight : 0.0F;
-    };
-    float inside = 0, outside = 0;
-    const float dark = meanOf(disc_, inside), bright = meanOf(ring_, outside);
-    const float seen = inside / static_cast<float>(disc_.size());
-    if (seen < kLidDarkness || outside < 8) return -1e9F;
-    return (bright - dark) * std::sqrt(seen);
+    const Sum inside = sumOver(cx, cy, disc_), all = sumOver(cx, cy, ring_);
+    const Sum outside{all.seen - inside.seen, all.bright - inside.bright};
+    const float share = inside.seen / static_cast<float>(disc_pixels_);
+    if (share < kLidDarkness || outside.seen < 8) return -1e9F;
+    return (outside.bright / outside.seen - inside.bright / inside.seen) * std::sqrt(share);
   };
   // Every second place first, then around the best, then between the pixels.
   int best_x = kWidth / 2, best_y = kHeight / 2;

@@ -28,11 +28,11 @@ class PupilFinder {
   Pupil findOne(const Image& image, std::span<const std::array<float, 2>> lids);
 
   std::vector<float> grey_;  // upright patch around one eye
-  std::vector<float> open_;  // 1 between the lids
-  struct Tap {
-    int x, y;
-  };
-  std::vector<Tap> disc_, ring_;
+  // What lies between the lids, and its brightness, summed along each row of the patch up to each pixel.
+  std::vector<float> seen_, bright_;
+  // Half the width of each row of the disc (the iris), and of the disc with the ring around it.
+  std::vector<int> disc_, ring_;
+  int disc_pixels_ = 0;
 };
 
 }  // namespace volto::capture
