@@ -260,11 +260,11 @@ std::string readModelBytes(const ModelFile& model, bool allow_unlisted) {
   if (hash == model.manifest.sha256 || allow_unlisted) return bytes;
   if (model.manifest.sha256.empty()) {
     fail(where, "its manifest names no SHA-256; if you trust the file put " + hash +
-                    " into a manifest of your own, or allow unlisted models");
+                    " into a manifest of your own, or give --allow-unlisted-model");
   }
   fail(where, "is not the file that " + model.manifest.name + " names (SHA-256 " + hash.substr(0, 16) + "..., not " +
                   model.manifest.sha256.substr(0, 16) + "...): cut off or another version; get it again from " +
-                  model.manifest.get + ", or allow unlisted models");
+                  model.manifest.get + ", or give --allow-unlisted-model");
 }
 
 }  // namespace volto::capture

@@ -24,8 +24,9 @@ std::string whyNotOpen(System& system, const std::string& path, int error) {
     case EPERM: {
       const std::string group = system.groupOf(path);
       return path + ": permission denied" +
-             (group.empty()
-                  ? std::string("; ask for access to it")
+             (group.empty() ? std::string("; ask for access to it")
+              : group == "root"  // nobody should join that
+                  ? std::string("; it belongs to root alone: a udev rule has to give it to a group (Debian: video)")
                   : "; it belongs to group " + group + ": sudo usermod -aG " + group + " $USER, then log in again");
     }
     case EBUSY:

@@ -233,7 +233,9 @@ class VideoSource final : public ImageSource {
 
   Next atEnd() {
     state_ = SourceState::ended;
-    if (announced_ > 0 && seq_ < static_cast<std::uint64_t>(announced_) && !options_.loop) {
+    // Some files announce a few more than they hold.
+    const std::int64_t missing = announced_ - static_cast<std::int64_t>(seq_);
+    if (announced_ > 0 && missing > 2 + announced_ / 100 && !options_.loop) {
       notice_ = path_ + ": ended after " + std::to_string(seq_) + " of " + std::to_string(announced_) +
                 " pictures; the file is cut off or damaged";
     }

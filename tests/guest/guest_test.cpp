@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <iostream>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -18,7 +19,17 @@ using nlohmann::json;
 
 TEST(Guest, VoltoStreamsFromARealDriverAndSurvivesADisconnect) {
   const TemporaryDir out;
-  Process guest({(sourceDir() / "tests/guest/run").string(), voltoProgram(), VOLTO_V4L2_ANSWERS, out.path().string()});
+  std::vector<std::string> command{(sourceDir() / "tests/guest/run").string(), voltoProgram(), VOLTO_V4L2_ANSWERS,
+                                   out.path().string()};
+  // The whole chain too, where there are models.
+  const auto data = dataDir();
+  const TemporaryDir made;
+  if (data) {
+    const std::string head = (sourceDir() / "rig/assets/volto_head").string(), rig = (made / "head.rig").string();
+    ASSERT_EQ(volto({"rig", head + ".obj", "--points", head + ".points.json", "-o", rig}).status, 0);
+    command.insert(command.end(), {rig, (*data / "models").string()});
+  }
+  Process guest(command);
   const Finished finished = guest.wait(std::chrono::seconds(290));
   if (finished.status == 77) GTEST_SKIP() << finished.out;
   ASSERT_EQ(finished.status, 0) << finished.out << finished.err;
@@ -46,6 +57,13 @@ TEST(Guest, VoltoStreamsFromARealDriverAndSurvivesADisconnect) {
   EXPECT_TRUE(story.starts_with("streaming; ")) << story;
   EXPECT_NE(story.find("no signal; "), std::string::npos) << story;
   EXPECT_TRUE(story.ends_with("streaming; ")) << story;
+
+  if (!data) return;
+  const std::string figures = readFile(out / "run.out");
+  std::cout << figures;
+  EXPECT_EQ(readFile(out / "run.status"), "0\n") << readFile(out / "run.err");
+  EXPECT_NE(figures.find(" 0 with a face"), std::string::npos) << figures;
+  EXPECT_EQ(figures.find("\n0 frames"), std::string::npos) << figures << readFile(out / "run.err");
 }
 
 }  // namespace

@@ -73,16 +73,16 @@ pipeline::LiveInput openInput(const Options& options) {
     }
     return input;
   }
+  if (options.source.find("://") != std::string::npos) {
+    throw CommandError(
+        kWrongUsage, options.source + " is no source; give camera:NAME, a video file, or udp://HOST:PORT (landmarks)");
+  }
   input.finder.emplace(makeFaceFinder(options.models));
   if (capture::isCameraSpec(options.source)) {
     capture::CameraOptions camera = cameraOptions(options.source, options.camera);
     camera.wait_for_camera = options.wait_for_camera;
     input.images = capture::openCamera(camera);
     return input;
-  }
-  if (options.source.find("://") != std::string::npos) {
-    throw CommandError(
-        kWrongUsage, options.source + " is no source; give camera:NAME, a video file, or udp://HOST:PORT (landmarks)");
   }
   input.live = false;
   capture::VideoOptions video{.realtime = options.realtime, .loop = options.loop};

@@ -89,6 +89,13 @@ TEST(CameraTrouble, PermissionDeniedNamesTheGroupAndWhatToDo) {
                    {"permission denied", "group video", "usermod -aG video"}));
 }
 
+TEST(CameraTrouble, NobodyIsToldToJoinRoot) {
+  const std::string said =
+      openingError("open EACCES", named("/dev/video0"), [](fake::VirtualSystem& system) { system.group = "root"; });
+  EXPECT_TRUE(says(said, {"permission denied", "udev"}));
+  EXPECT_EQ(said.find("usermod"), std::string::npos) << said;
+}
+
 TEST(CameraTrouble, BusyNamesTheHolder) {
   EXPECT_TRUE(says(openingError("busy", {}, [](fake::VirtualSystem& system) { system.holder = "pid 712 (zoom)"; }),
                    {"/dev/video0", "in use by pid 712 (zoom)"}));
