@@ -170,15 +170,9 @@ struct HealthMeasure::State {
       deformer.deformAtWeights(weights, positions);
       for (const rig::SlitContact& slit : contacts.slits) {
         if (slit.place != (left ? rig::SlitContact::Place::left_eye : rig::SlitContact::Place::right_eye)) continue;
-        for (std::size_t j = 0; j < slit.upper.size(); ++j) {
-          const auto on = [&](const rig::SlitContact::Sample& s) -> Eigen::Vector3d {
-            return at(positions, s.first) +
-                   static_cast<double>(s.share_of_second) * (at(positions, s.second) - at(positions, s.first));
-          };
-          const Eigen::Vector3d up(static_cast<double>(slit.up[0]), static_cast<double>(slit.up[1]),
-                                   static_cast<double>(slit.up[2]));
-          widest = std::max(widest, up.dot(on(slit.upper[j]) - on(slit.lower[j])) / es);
-        }
+        const std::array<float, rig::kMaxSlitColumns> gaps = rig::slitGaps(slit, positions);
+        for (std::size_t j = 0; j < slit.upper.size(); ++j)
+          widest = std::max(widest, static_cast<double>(gaps[j]) / es);
       }
     }
     return widest;

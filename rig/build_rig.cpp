@@ -348,6 +348,7 @@ Rig buildRig(const Mesh& neutral, const FeaturePointChoices& points, const RigOp
   rig.blendshapes = arkitBlendshapes(rig);
   rig.part_motions = partMotions(rig);
   makeCorrections(rig, skin);
+  rig.contacts.folds = guardAgainstFolds(rig, skin);
   return rig;
 }
 

@@ -22,72 +22,128 @@ using Vec3 = std::array<float, 3>;
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-void keepOutOfBall(const BallContact& ball, std::span<Vec3> positions) {
+void keepOnBall(const BallContact& ball, std::span<Vec3> positions) {
+  const bool held = !ball.hold.empty();
   for (std::size_t i = 0; i < ball.vertex.size(); ++i) {
     Vec3& p = positions[ball.vertex[i]];
     const Vec3 arm = p - ball.centre;
     const float squared = dot(arm, arm), least = ball.distance[i];
-    if (squared < least * least && squared > 1e-12F * least * least)
-      p = ball.centre + (least / std::sqrt(squared)) * arm;
-  }
-}
-
-struct Column {
-  float upper, lower;  // heights of the margins along `up`
-  float missing;       // of the gap
-};
-
-// Heights of the margins and what is missing, per column.
-void measureColumns(const SlitContact& slit, std::span<const Vec3> positions,
-                    std::array<Column, kMaxSlitColumns>& columns) {
-  const auto height = [&](const SlitContact::Sample& s) {
-    const float first = dot(slit.up, positions[s.first]), second = dot(slit.up, positions[s.second]);
-    return first + s.share_of_second * (second - first);
-  };
-  for (std::size_t j = 0; j < slit.upper.size(); ++j) {
-    const float upper = height(slit.upper[j]), lower = height(slit.lower[j]);
-    columns[j] = {upper, lower, std::max(0.0F, slit.least_gap[j] - (upper - lower))};
-  }
-}
-
-// `p` goes up by `by`, along the ball's surface where there is one.
-void giveWay(const SlitContact& slit, const BallContact* ball, float by, Vec3& p) {
-  Vec3 way = slit.up;
-  if (ball != nullptr) {
-    const Vec3 arm = p - ball->centre;
-    const float squared = dot(arm, arm);
-    if (squared > 0) {
-      const Vec3 tangent = slit.up - (dot(slit.up, arm) / squared) * arm;
-      // Near the ball's poles the surface hardly rises: never more than twice as far along it as up.
-      way = (1 / std::max(dot(slit.up, tangent), 0.5F)) * tangent;
+    if (squared < least * least) {
+      if (squared > 1e-12F * least * least) p = ball.centre + (least / std::sqrt(squared)) * arm;
+    } else if (held && ball.hold[i] > 0 && squared > ball.outer[i] * ball.outer[i]) {
+      const float distance = std::sqrt(squared);
+      p = ball.centre + ((distance + ball.hold[i] * (ball.outer[i] - distance)) / distance) * arm;
     }
   }
-  p = p + by * way;
+}
+
+// The margins as they are now.
+struct Columns {
+  Vec3 across;           // unit, at right angles to `up`: from corner to corner
+  float from, per_unit;  // column of a place: (across . place - from) * per_unit
+  std::size_t last;
+  std::array<float, kMaxSlitColumns> upper, lower;  // heights of the margins along `up`
+  std::array<float, kMaxSlitColumns> missing;       // of the gap
+
+  float columnOf(const Vec3& p, float otherwise) const {
+    if (!(per_unit > 0)) return otherwise;
+    const float column = (dot(across, p) - from) * per_unit;
+    return column > 0 ? std::min(column, static_cast<float>(last)) : 0.0F;
+  }
+};
+
+Vec3 placeOf(const SlitContact::Sample& s, std::span<const Vec3> positions) {
+  const Vec3& first = positions[s.first];
+  return first + s.share_of_second * (positions[s.second] - first);
+}
+
+// Height of one margin at each column, from its samples, which are at rest one per column and now wherever they are.
+void measureMargin(const SlitContact& slit, const std::vector<SlitContact::Sample>& samples,
+                   std::span<const Vec3> positions, const Columns& columns,
+                   std::array<float, kMaxSlitColumns>& heights) {
+  std::size_t next = 0;
+  float column_before = 0, height_before = 0;
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const Vec3 p = placeOf(samples[k], positions);
+    const float height = dot(slit.up, p);
+    // Margins do not run backwards.
+    const float column = std::max(column_before, columns.columnOf(p, static_cast<float>(k)));
+    for (; next <= columns.last && static_cast<float>(next) <= column; ++next) {
+      const float step = column - column_before;
+      const float t = k > 0 && step > 1e-6F ? (static_cast<float>(next) - column_before) / step : 1.0F;
+      heights[next] = k > 0 ? height_before + t * (height - height_before) : height;
+    }
+    column_before = column;
+    height_before = height;
+  }
+  for (; next <= columns.last; ++next) heights[next] = height_before;
+}
+
+Columns measureColumns(const SlitContact& slit, std::span<const Vec3> positions) {
+  Columns out;
+  out.last = slit.upper.size() - 1;
+  const Vec3 from = 0.5F * (placeOf(slit.upper.front(), positions) + placeOf(slit.lower.front(), positions));
+  const Vec3 way = 0.5F * (placeOf(slit.upper.back(), positions) + placeOf(slit.lower.back(), positions)) - from;
+  const Vec3 flat = way - dot(slit.up, way) * slit.up;
+  const float length = std::sqrt(dot(flat, flat));
+  out.across = (length > 0 ? 1 / length : 0.0F) * flat;
+  out.from = dot(out.across, from);
+  out.per_unit = length > 0 ? static_cast<float>(out.last) / length : 0.0F;
+  measureMargin(slit, slit.upper, positions, out, out.upper);
+  measureMargin(slit, slit.lower, positions, out, out.lower);
+  for (std::size_t j = 0; j <= out.last; ++j)
+    out.missing[j] = std::max(0.0F, slit.least_gap[j] - (out.upper[j] - out.lower[j]));
+  return out;
+}
+
+// `p` goes up by `by`; where there is a ball, around it along a meridian: as far from its centre as before.
+void giveWay(const SlitContact& slit, const BallContact* ball, float by, Vec3& p) {
+  if (ball != nullptr) {
+    const Vec3 arm = p - ball->centre;
+    const float squared = dot(arm, arm), height = dot(slit.up, arm), flat = squared - height * height;
+    // Near the poles the surface hardly rises.
+    if (flat > 0.05F * squared) {
+      const float limit = 0.97F * std::sqrt(squared), now = std::clamp(height + by, -limit, limit);
+      const float scale = std::sqrt((squared - now * now) / flat);
+      p = ball->centre + scale * (arm - height * slit.up) + now * slit.up;
+      return;
+    }
+  }
+  p = p + by * slit.up;
 }
 
 void partSides(const SlitContact& slit, const BallContact* ball, std::span<Vec3> positions) {
-  std::array<Column, kMaxSlitColumns> columns;
-  measureColumns(slit, positions, columns);
-  const std::size_t last = slit.upper.size() - 1;
+  const Columns columns = measureColumns(slit, positions);
   for (std::size_t i = 0; i < slit.vertex.size(); ++i) {
-    const auto j = static_cast<std::size_t>(slit.column[i]);
-    const Column& a = columns[std::min(j, last)];
-    const Column& b = columns[std::min(j + 1, last)];
-    const float t = slit.column[i] - static_cast<float>(j);
-    const float missing = a.missing + t * (b.missing - a.missing), share = slit.share[i];
     Vec3& p = positions[slit.vertex[i]];
+    const float column = columns.columnOf(p, slit.column[i]), share = slit.share[i];
+    const std::size_t a = std::min(static_cast<std::size_t>(column), columns.last), b = std::min(a + 1, columns.last);
+    const float t = column - static_cast<float>(a);
+    const auto between = [&](const auto& of) { return of[a] + t * (of[b] - of[a]); };
+    const float missing = between(columns.missing);
     const float give = missing * (share > 0 ? slit.upper_share : 1 - slit.upper_share);
     if (missing > 0) giveWay(slit, ball, share * give, p);
     // Whatever lies beyond the other side's margin by more than it did at rest.
     if (share > 0) {
-      const float other = a.lower + t * (b.lower - a.lower) - (1 - slit.upper_share) * missing;
+      const float other = between(columns.lower) - (1 - slit.upper_share) * missing;
       const float beyond = other + slit.reach[i] - dot(slit.up, p);
       if (beyond > 0) giveWay(slit, ball, share * beyond, p);
     } else {
-      const float other = a.upper + t * (b.upper - a.upper) + slit.upper_share * missing;
+      const float other = between(columns.upper) + slit.upper_share * missing;
       const float beyond = dot(slit.up, p) - (other - slit.reach[i]);
       if (beyond > 0) giveWay(slit, ball, share * beyond, p);
     }
+  }
+}
+
+// Triangles that were nearly turned over get back what they need; the lids stay out of the balls meanwhile.
+void unfold(const Contacts& contacts, std::span<Vec3> positions) {
+  constexpr int kMostRounds = 24, kBallsEvery = 4;
+  if (contacts.folds.empty() || unfoldOnce(contacts.folds, contacts.folds.watched, positions) == 0) return;
+  for (int round = 1; round < kMostRounds; ++round) {
+    if (round % kBallsEvery == 0)
+      for (const BallContact& ball : contacts.balls) keepOnBall(ball, positions);
+    if (unfoldOnce(contacts.folds, contacts.folds.triangle.size(), positions) == 0) return;
   }
 }
 
@@ -120,11 +176,19 @@ const BallContact* ballOf(const Contacts& contacts, std::int32_t index) {
 
 }  // namespace
 
+std::array<float, kMaxSlitColumns> slitGaps(const SlitContact& slit, std::span<const Vec3> positions) {
+  const Columns columns = measureColumns(slit, positions);
+  std::array<float, kMaxSlitColumns> out{};
+  for (std::size_t j = 0; j <= columns.last; ++j) out[j] = columns.upper[j] - columns.lower[j];
+  return out;
+}
+
 void resolveContacts(const Contacts& contacts, std::span<const Vec3> neutral, std::span<Vec3> positions) {
-  for (const BallContact& ball : contacts.balls) keepOutOfBall(ball, positions);
+  for (const BallContact& ball : contacts.balls) keepOnBall(ball, positions);
   for (const SlitContact& slit : contacts.slits) partSides(slit, ballOf(contacts, slit.ball), positions);
   if (!contacts.slits.empty())
-    for (const BallContact& ball : contacts.balls) keepOutOfBall(ball, positions);
+    for (const BallContact& ball : contacts.balls) keepOnBall(ball, positions);
+  unfold(contacts, positions);
   for (const Rider& rider : contacts.riders) ride(rider, ballOf(contacts, rider.ball), neutral, positions);
 }
 
@@ -135,11 +199,10 @@ Penetration measurePenetration(const Contacts& contacts, std::span<const Vec3> p
       const Vec3 arm = positions[ball.vertex[i]] - ball.centre;
       out.ball = std::max(out.ball, std::min(ball.radius, ball.distance[i]) - std::sqrt(dot(arm, arm)));
     }
-  std::array<Column, kMaxSlitColumns> columns;
   for (const SlitContact& slit : contacts.slits) {
-    measureColumns(slit, positions, columns);
+    const Columns columns = measureColumns(slit, positions);
     float& deepest = slit.place == SlitContact::Place::mouth ? out.lips : out.lids;
-    for (std::size_t j = 0; j < slit.upper.size(); ++j) deepest = std::max(deepest, columns[j].missing);
+    for (std::size_t j = 0; j < slit.upper.size(); ++j) deepest = std::max(deepest, columns.missing[j]);
   }
   return out;
 }

@@ -161,13 +161,8 @@ class CorrectionMaker {
 
   // What is open between the margins, per column.
   std::vector<float> gaps(const SlitContact& slit) const {
-    const Vec up = toVec(slit.up);
-    const auto on = [&](const SlitContact::Sample& s) -> Vec {
-      return lab_.at(s.first) + s.share_of_second * (lab_.at(s.second) - lab_.at(s.first));
-    };
-    std::vector<float> out;
-    for (std::size_t j = 0; j < slit.upper.size(); ++j) out.push_back(up.dot(on(slit.upper[j]) - on(slit.lower[j])));
-    return out;
+    const std::array<float, kMaxSlitColumns> all = slitGaps(slit, lab_.positions());
+    return {all.begin(), all.begin() + static_cast<std::ptrdiff_t>(slit.upper.size())};
   }
 
   // Leads the margins together along the ball, a little beyond so that a blink that is not quite full closes too;

@@ -8,11 +8,12 @@
 #include <Eigen/Geometry>
 
 #include "rig/closest_point.h"
+#include "rig/pose.h"
 
 namespace volto::rig {
 namespace {
 
-constexpr std::size_t kMouthColumns = 41, kEyeColumns = 25;
+constexpr std::size_t kMouthColumns = 61, kEyeColumns = 41;
 
 double smoothStep(double x) {
   x = std::clamp(x, 0.0, 1.0);
@@ -122,24 +123,72 @@ class ContactFinder {
 
   // --- lips and lids
 
-  // Shortest way along the skin through the points; empty where it cannot be found.
+  // A smooth curve through the points (Catmull and Rom), dense.
+  std::vector<Eigen::Vector3d> curve(const std::array<std::string_view, 5>& ids) const {
+    constexpr int kSteps = 16;
+    std::vector<Eigen::Vector3d> out;
+    for (std::size_t i = 0; i + 1 < ids.size(); ++i) {
+      const Eigen::Vector3d b = point(ids[i]), c = point(ids[i + 1]);
+      const Eigen::Vector3d a = i > 0 ? point(ids[i - 1]) : Eigen::Vector3d(2 * b - c);
+      const Eigen::Vector3d d = i + 2 < ids.size() ? point(ids[i + 2]) : Eigen::Vector3d(2 * c - b);
+      for (int k = 0; k < kSteps; ++k) {
+        const double f = static_cast<double>(k) / kSteps;
+        out.push_back(b + 0.5 * f * (c - a + f * (2 * a - 5 * b + 4 * c - d + f * (3 * (b - c) + d - a))));
+      }
+    }
+    out.push_back(point(ids.back()));
+    return out;
+  }
+
+  // The skin's edges, each the longer the farther it is from the curve: behind a lid's or lip's edge the way is shorter
+  // in itself.
+  EdgeGraph graphAlong(const std::vector<Eigen::Vector3d>& curve) const {
+    const double near = 0.01 * es_, far = 0.3 * es_;
+    EdgeGraph out = skin_.graph;
+    std::vector<double> distance(static_cast<std::size_t>(at_.rows()), far);
+    Eigen::Vector3d low = curve.front(), high = low;
+    for (const Eigen::Vector3d& c : curve) {
+      low = low.cwiseMin(c);
+      high = high.cwiseMax(c);
+    }
+    for (std::uint32_t v = 0; v < distance.size(); ++v) {
+      const Eigen::Vector3d p = position(v);
+      if (((p - low).array() < -far).any() || ((p - high).array() > far).any()) continue;
+      for (std::size_t i = 0; i + 1 < curve.size(); ++i) {
+        const Eigen::Vector3d along = curve[i + 1] - curve[i];
+        const double length2 = along.squaredNorm();
+        const double t = length2 > 0 ? std::clamp((p - curve[i]).dot(along) / length2, 0.0, 1.0) : 0.0;
+        distance[v] = std::min(distance[v], (p - curve[i] - t * along).norm());
+      }
+    }
+    for (std::uint32_t v = 0; v < distance.size(); ++v)
+      for (std::uint32_t e = out.start[v]; e < out.start[v + 1]; ++e) {
+        const double off = 0.5 * (distance[v] + distance[out.neighbour[e]]) / near;
+        out.length[e] = static_cast<float>(static_cast<double>(out.length[e]) * (1 + off * off));
+      }
+    return out;
+  }
+
+  // Along the skin through the points, near a smooth curve through them; empty where there is no way.
   std::vector<std::uint32_t> margin(const std::array<std::string_view, 5>& ids) const {
+    const EdgeGraph graph = graphAlong(curve(ids));
     std::vector<std::uint32_t> path = {skinVertex(ids[0])};
     for (std::size_t i = 1; i < ids.size(); ++i) {
       const std::uint32_t from = skinVertex(ids[i]);
       const GeodesicSource source{from, 0.0F};
-      const auto limit = static_cast<float>(3 * (position(from) - position(path.back())).norm() + 0.2 * es_);
-      const std::vector<float> distance = geodesicDistances(skin_.graph, {&source, 1}, limit).distance;
+      // A hundred times: a coarse mesh has no vertices near the curve.
+      const auto limit = static_cast<float>(100 * (3 * (position(from) - position(path.back())).norm() + 0.2 * es_));
+      const std::vector<float> distance = geodesicDistances(graph, {&source, 1}, limit).distance;
       if (!(distance[path.back()] < kUnreached)) return {};
       while (path.back() != from) {
         const std::uint32_t v = path.back();
         std::uint32_t next = v;
         float best = distance[v];
-        for (std::uint32_t e = skin_.graph.start[v]; e < skin_.graph.start[v + 1]; ++e) {
-          const std::uint32_t u = skin_.graph.neighbour[e];
+        for (std::uint32_t e = graph.start[v]; e < graph.start[v + 1]; ++e) {
+          const std::uint32_t u = graph.neighbour[e];
           if (distance[u] < best) {
             // On the shortest way: distance[v] = length + distance[u], up to rounding.
-            if (distance[u] + skin_.graph.length[e] <= distance[v] * (1 + 1e-5F)) {
+            if (distance[u] + graph.length[e] <= distance[v] * (1 + 1e-5F)) {
               best = distance[u];
               next = u;
             }
@@ -196,14 +245,40 @@ class ContactFinder {
       };
       upper_height.push_back(height(slit.upper[j]));
       lower_height.push_back(height(slit.lower[j]));
-      slit.least_gap.push_back(static_cast<float>(std::min(0.0, upper_height[j] - lower_height[j]) - 1e-6 * es_));
     }
+    slit.least_gap.resize(columns);
+    const std::array<float, kMaxSlitColumns> gaps = slitGaps(slit, neutralPositions(rig_));
+    for (std::size_t j = 0; j < columns; ++j)
+      slit.least_gap[j] = std::min(0.0F, gaps[j]) - static_cast<float>(1e-5 * es_);
     addSide(points.upper_side, upper, 1.0, (point(points.upper_extent) - point(points.upper[2])).norm(), along, up,
             lower_height, slit);
     addSide(points.lower_side, lower, -1.0, (point(points.lower_extent) - point(points.lower[2])).norm(), along, up,
             upper_height, slit);
     sortVertices(slit);
+    if (slit.ball >= 0) holdLids(upper, lower, out_.balls[static_cast<std::size_t>(slit.ball)]);
     if (!slit.vertex.empty()) out_.slits.push_back(std::move(slit));
+  }
+
+  // The margins, what is behind them along the ball, and less and less of the skin before them.
+  void holdLids(const std::vector<std::uint32_t>& upper, const std::vector<std::uint32_t>& lower,
+                BallContact& ball) const {
+    const double fully = 0.03 * es_, fade = 0.07 * es_;
+    std::vector<GeodesicSource> sources;
+    for (const auto* path : {&upper, &lower})
+      for (const std::uint32_t v : *path) sources.push_back({v, 0.0F});
+    const std::vector<float> distance =
+        geodesicDistances(skin_.graph, sources, static_cast<float>(fully + fade)).distance;
+    const Eigen::Vector3d centre = Eigen::Map<const Eigen::Vector3f>(ball.centre.data()).cast<double>();
+    ball.outer.clear();
+    ball.hold.clear();
+    for (std::size_t i = 0; i < ball.vertex.size(); ++i) {
+      const std::uint32_t v = ball.vertex[i];
+      const double at_rest = (position(v) - centre).norm(), way = static_cast<double>(distance[skin_.same_as[v]]);
+      const double hold = 1 - smoothStep((way - fully) / fade);
+      ball.outer.push_back(static_cast<float>(at_rest * (1 + 2e-6)));
+      ball.hold.push_back(static_cast<float>(hold));
+      ball.distance[i] += static_cast<float>(hold) * (static_cast<float>(at_rest * (1 - 2e-6)) - ball.distance[i]);
+    }
   }
 
   template <class Along>
@@ -228,7 +303,7 @@ class ContactFinder {
       slit.vertex.push_back(v);
       slit.column.push_back(static_cast<float>(column));
       slit.share.push_back(static_cast<float>(sign * share));
-      slit.reach.push_back(static_cast<float>(std::min(0.0, sign * (up.dot(position(v)) - other)) - 2e-6 * es_));
+      slit.reach.push_back(static_cast<float>(std::min(0.0, sign * (up.dot(position(v)) - other)) - 1e-5 * es_));
     }
   }
 

@@ -112,6 +112,35 @@ std::vector<SlitContact::Sample> decode(const file::Samples* in) {
   return out;
 }
 
+flatbuffers::Offset<file::FoldGuard> encode(flatbuffers::FlatBufferBuilder& builder, const FoldGuard& guard) {
+  std::vector<std::uint32_t> triangle, copies;
+  std::vector<float> normal;
+  for (const auto& t : guard.triangle) triangle.insert(triangle.end(), t.begin(), t.end());
+  for (const auto& n : guard.normal) normal.insert(normal.end(), n.begin(), n.end());
+  for (const auto& pair : guard.copies) copies.insert(copies.end(), pair.begin(), pair.end());
+  const auto triangles = builder.CreateVector(triangle);
+  const auto normals = builder.CreateVector(normal), least = builder.CreateVector(guard.least);
+  const auto pairs = builder.CreateVector(copies);
+  return file::CreateFoldGuard(builder, triangles, static_cast<std::uint32_t>(guard.watched), normals, least, pairs);
+}
+
+FoldGuard decode(const file::FoldGuard* in) {
+  FoldGuard out;
+  if (in == nullptr) return out;
+  const auto triangle = numbers(in->triangle()), copies = numbers(in->copies());
+  const auto normal = numbers(in->normal());
+  out.least = numbers(in->least());
+  out.watched = in->watched();
+  require(triangle.size() == 3 * out.least.size() && normal.size() == triangle.size() && copies.size() % 2 == 0,
+          "triangles that must not fold do not fit together");
+  for (std::size_t i = 0; i < triangle.size(); i += 3) {
+    out.triangle.push_back({triangle[i], triangle[i + 1], triangle[i + 2]});
+    out.normal.push_back({normal[i], normal[i + 1], normal[i + 2]});
+  }
+  for (std::size_t i = 0; i < copies.size(); i += 2) out.copies.push_back({copies[i], copies[i + 1]});
+  return out;
+}
+
 void decodeCombinations(const file::Motion& in, Rig& rig) {
   if (in.combinations() == nullptr) return;
   require(in.combinations()->size() <= kMaxCombinations, "more than 65536 combinations");
@@ -154,7 +183,8 @@ void decodeContacts(const file::Motion& in, Contacts& contacts) {
   if (in.balls() != nullptr)
     for (const file::BallContact* ball : *in.balls())
       contacts.balls.push_back({threeOf(ball->centre(), "an eyeball without a centre"), ball->radius(),
-                                numbers(ball->vertex()), numbers(ball->distance())});
+                                numbers(ball->vertex()), numbers(ball->distance()), numbers(ball->outer()),
+                                numbers(ball->hold())});
   if (in.slits() != nullptr)
     for (const file::SlitContact* slit : *in.slits()) {
       SlitContact out;
@@ -182,6 +212,7 @@ void decodeContacts(const file::Motion& in, Contacts& contacts) {
                                {anchor[3 * i], anchor[3 * i + 1], anchor[3 * i + 2]},
                                {weight[3 * i], weight[3 * i + 1], weight[3 * i + 2]},
                                ball[i]});
+  contacts.folds = decode(in.folds());
 }
 
 }  // namespace
@@ -197,7 +228,9 @@ flatbuffers::Offset<file::Motion> encodeMotion(flatbuffers::FlatBufferBuilder& b
   for (const BallContact& ball : contacts.balls) {
     const auto centre = three(builder, ball.centre);
     const auto vertex = builder.CreateVector(ball.vertex);
-    balls.push_back(file::CreateBallContact(builder, centre, ball.radius, vertex, builder.CreateVector(ball.distance)));
+    const auto distance = builder.CreateVector(ball.distance), outer = builder.CreateVector(ball.outer),
+               hold = builder.CreateVector(ball.hold);
+    balls.push_back(file::CreateBallContact(builder, centre, ball.radius, vertex, distance, outer, hold));
   }
   const auto ball_vector = builder.CreateVector(balls);
   std::vector<flatbuffers::Offset<file::SlitContact>> slits;
@@ -224,8 +257,9 @@ flatbuffers::Offset<file::Motion> encodeMotion(flatbuffers::FlatBufferBuilder& b
   const auto riders = builder.CreateVector(rider), anchors = builder.CreateVector(anchor);
   const auto weights = builder.CreateVector(weight);
   const auto rider_balls = builder.CreateVector(rider_ball);
+  const auto folds = encode(builder, contacts.folds);
   return file::CreateMotion(builder, correction_vector, combinations, motions, ball_vector, slit_vector, riders,
-                            anchors, weights, rider_balls);
+                            anchors, weights, rider_balls, folds);
 }
 
 void decodeMotion(const file::Motion* motion, Rig& rig) {

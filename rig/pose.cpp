@@ -116,6 +116,21 @@ void checkSlit(const SlitContact& slit, const Contacts& contacts, std::size_t ve
   if (!(slit.upper_share >= 0 && slit.upper_share <= 1)) refuse(what + " is shared out of range");
 }
 
+void checkFolds(const FoldGuard& guard, std::size_t vertices) {
+  const std::string what = "guard against folds";
+  const auto inRange = [&](std::uint32_t v) { return v < vertices; };
+  if (guard.normal.size() != guard.triangle.size() || guard.least.size() != guard.triangle.size() ||
+      guard.watched > guard.triangle.size())
+    refuse(what + " has lists of different lengths");
+  for (const auto& t : guard.triangle)
+    if (!std::all_of(t.begin(), t.end(), inRange)) refuse(what + " names a vertex that is not there");
+  for (const auto& pair : guard.copies)
+    if (!std::all_of(pair.begin(), pair.end(), inRange)) refuse(what + " names a vertex that is not there");
+  for (const auto& n : guard.normal) requireFinite(n, what);
+  for (const float least : guard.least)
+    if (!(least > 0 && std::isfinite(least))) refuse(what + " wants an area that is not positive");
+}
+
 void checkContacts(const Contacts& contacts, std::size_t vertices) {
   for (const BallContact& ball : contacts.balls) {
     requireVertices(ball.vertex, vertices, "contact with an eyeball");
@@ -124,7 +139,14 @@ void checkContacts(const Contacts& contacts, std::size_t vertices) {
       refuse("contact with an eyeball does not fit together");
     for (const float d : ball.distance)
       if (!(d > 0 && std::isfinite(d))) refuse("contact with an eyeball has a distance that is not positive");
+    if (ball.hold.size() != ball.outer.size() || (!ball.hold.empty() && ball.hold.size() != ball.vertex.size()))
+      refuse("contact with an eyeball does not fit together");
+    for (const float d : ball.outer)
+      if (!(d > 0 && std::isfinite(d))) refuse("contact with an eyeball has a distance that is not positive");
+    for (const float h : ball.hold)
+      if (!(h >= 0 && h <= 1)) refuse("contact with an eyeball holds by a share out of range");
   }
+  checkFolds(contacts.folds, vertices);
   for (const SlitContact& slit : contacts.slits) checkSlit(slit, contacts, vertices);
   for (const Rider& rider : contacts.riders) {
     if (rider.vertex >= vertices || rider.ball < -1 || rider.ball >= static_cast<std::int32_t>(contacts.balls.size()))

@@ -119,7 +119,8 @@ TEST_F(PoseData, TravelsInTheRigFile) {
                        {"a beyond b", Combination::Rule::excess, {{0, false}, {1, false}}, {{0}, {{1, 0, 0}}}}};
   rig_.part_motions = {{RigidPart::Follows::jaw, {1, 2, 3}, {0, 5}, {1, 0.5F}, {{2, {0.1F, 0, 0}, {0, 0, 1}}}}};
   rig_.contacts = {};
-  rig_.contacts.balls = {{{0, 0, 1}, 2, {3}, {2.5F}}};
+  rig_.contacts.balls = {{{0, 0, 1}, 2, {3}, {2.5F}, {2.75F}, {0.5F}}};
+  rig_.contacts.folds = {{{1, 2, 3}, {2, 3, 4}}, 1, {{0, 0, 1}, {0, 1, 0}}, {0.5F, 0.25F}, {{5, 4}}};
   rig_.contacts.riders = {{7, {1, 2, 3}, {0.25F, 0.25F, 0.5F}, 0}};
   const std::vector<std::byte> bytes = encodeRig(rig_);
   const Rig back = decodeRig(bytes, "t.rig");
@@ -131,6 +132,12 @@ TEST_F(PoseData, TravelsInTheRigFile) {
   ASSERT_EQ(back.part_motions.size(), 1U);
   EXPECT_EQ(back.part_motions[0].turns[0].translation, (P{0, 0, 1}));
   EXPECT_EQ(back.contacts.balls[0].distance, rig_.contacts.balls[0].distance);
+  EXPECT_EQ(back.contacts.balls[0].outer, rig_.contacts.balls[0].outer);
+  EXPECT_EQ(back.contacts.balls[0].hold, rig_.contacts.balls[0].hold);
+  EXPECT_EQ(back.contacts.folds.triangle, rig_.contacts.folds.triangle);
+  EXPECT_EQ(back.contacts.folds.watched, 1U);
+  EXPECT_EQ(back.contacts.folds.normal, rig_.contacts.folds.normal);
+  EXPECT_EQ(back.contacts.folds.copies, rig_.contacts.folds.copies);
   EXPECT_EQ(back.contacts.riders[0].anchor, rig_.contacts.riders[0].anchor);
   EXPECT_EQ(encodeRig(back), bytes);
 }
@@ -160,8 +167,8 @@ TEST_F(PoseData, WhatDoesNotFitTheMeshIsRefusedWhenRead) {
       },
       "turn of no shape");
   refused([&](Rig& r) { r.part_motions = {{RigidPart::Follows::jaw, {}, {0}, {}, {}}}; }, "share missing");
-  refused([&](Rig& r) { r.contacts.balls = {{{0, 0, 0}, 0, {}, {}}}; }, "ball without radius");
-  refused([&](Rig& r) { r.contacts.balls = {{{0, 0, 0}, 1, {far}, {1}}}; }, "ball's vertex out of range");
+  refused([&](Rig& r) { r.contacts.balls = {{{0, 0, 0}, 0, {}, {}, {}, {}}}; }, "ball without radius");
+  refused([&](Rig& r) { r.contacts.balls = {{{0, 0, 0}, 1, {far}, {1}, {}, {}}}; }, "ball's vertex out of range");
   refused([&](Rig& r) { r.contacts.riders = {{0, {0, 0, far}, {1, 0, 0}, -1}}; }, "anchor out of range");
   refused([&](Rig& r) { r.contacts.riders = {{0, {0, 0, 0}, {1, 0, 0}, 5}}; }, "rider's ball");
   Contacts slit = Eye().contacts;

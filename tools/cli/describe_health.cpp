@@ -51,11 +51,9 @@ Json regionsOf(const rig::RigHealth& health) {
 Json expressionsOf(const rig::Rig& rig, Json& problems) {
   const retarget::ExpressionHealth health = retarget::measureExpressions(rig);
   Json flipping = Json::array();
-  std::size_t flipped = 0;
   const retarget::PoseHealth* worst = nullptr;
   for (const auto* list : {&health.shapes, &health.combinations})
     for (const retarget::PoseHealth& pose : *list) {
-      if (list == &health.shapes) flipped += pose.flipped;
       if (pose.flipped > 0) flipping.push_back({{"name", pose.name}, {"triangles", pose.flipped}});
       if (pose.flipped > 0 && (worst == nullptr || pose.flipped > worst->flipped)) worst = &pose;
     }
@@ -66,12 +64,15 @@ Json expressionsOf(const rig::Rig& rig, Json& problems) {
                        "): look at the picture of it (--picture)");
   return {{"shapes", health.shapes.size()},
           {"combinations", health.combinations.size()},
-          {"flipped_triangles", flipped},
+          {"flipped_triangles", health.flipped()},
+          {"degenerate_triangles", health.degenerate()},
           {"flipping", std::move(flipping)},
           {"eyeball_depth_es", deepest.eyeball_depth_es},
           {"lids_depth_es", deepest.lids_depth_es},
           {"lips_depth_es", deepest.lips_depth_es},
-          {"blink_gap_es", health.blink_gap_es}};
+          {"blink_gap_es", health.blink_gap_es},
+          {"symmetry_es", health.symmetry_es},
+          {"border_es", health.border_es}};
 }
 
 }  // namespace
@@ -110,9 +111,18 @@ std::string healthInWords(const Json& health, const Json& problems) {
   text += line;
   const Json& expressions = health["expressions"];
   std::snprintf(line, sizeof line,
-                "expressions: %zu triangles turn over in %zu shapes; doubtful vertices: %zu, unassigned: %zu\n",
+                "expressions: %zu triangles turn over in %zu shapes and %zu combinations, %zu degenerate; doubtful "
+                "vertices: %zu, unassigned: %zu\n",
                 expressions["flipped_triangles"].get<std::size_t>(), expressions["shapes"].get<std::size_t>(),
+                expressions["combinations"].get<std::size_t>(), expressions["degenerate_triangles"].get<std::size_t>(),
                 health["doubtful"]["count"].get<std::size_t>(), health["unassigned"]["count"].get<std::size_t>());
+  text += line;
+  std::snprintf(line, sizeof line,
+                "deepest, in %% of the eye separation: eyeball %.2f, lids %.2f, lips %.2f; open at a blink %.2f; left "
+                "against right %.4f; border %.4f\n",
+                100 * expressions["eyeball_depth_es"].get<double>(), 100 * expressions["lids_depth_es"].get<double>(),
+                100 * expressions["lips_depth_es"].get<double>(), 100 * expressions["blink_gap_es"].get<double>(),
+                100 * expressions["symmetry_es"].get<double>(), 100 * expressions["border_es"].get<double>());
   text += line;
   for (const Json& problem : problems) text += "problem: " + problem.get<std::string>() + "\n";
   return text;

@@ -13,7 +13,7 @@ namespace volto::cli {
 // `problems` gets one sentence for each thing that a person should mend. About a tenth of a second.
 nlohmann::ordered_json describeHealth(const rig::Rig& rig, nlohmann::ordered_json& problems);
 
-// Four lines at most, and the problems.
+// Five lines at most, and the problems.
 std::string healthInWords(const nlohmann::ordered_json& health, const nlohmann::ordered_json& problems);
 
 }  // namespace volto::cli

@@ -23,6 +23,7 @@ namespace {
 struct Options {
   std::string file;
   std::string picture, sheet, combinations;
+  std::string take;
   int cell_px = 256;
   bool json = false;
 };
@@ -41,12 +42,20 @@ int run(const Options& options) {
   if (pictures && !is_rig)
     throw CommandError(kBadData, options.file + ": --picture, --sheet and --combinations show a rig; this is a " +
                                      description.value("kind", "file"));
-  if (pictures || (is_rig && options.json)) {
+  if (!options.take.empty() && !is_rig)
+    throw CommandError(kBadData, options.file + ": --take plays on a rig; this is a " + description.value("kind", "file"));
+  std::string performance;
+  if (pictures || !options.take.empty() || (is_rig && options.json)) {
     const rig::Rig rig = rig::readRig(options.file);
     if (!options.picture.empty()) writeRigPicture(options.picture, rig);
     if (!options.sheet.empty()) writeShapeSheet(options.sheet, rig, options.cell_px);
     if (!options.combinations.empty()) writeCombinationSheet(options.combinations, rig, options.cell_px);
     if (options.json) description["expressions"] = expressionReport(rig);
+    if (!options.take.empty()) {
+      const Json report = performanceReport(rig, options.take);
+      performance = performanceInWords(report);
+      if (options.json) description["performance"] = report;
+    }
   }
   std::string text;
   if (options.json) {
@@ -59,6 +68,7 @@ int run(const Options& options) {
   } else {
     text = describeInWords(description);
   }
+  if (!options.json) text += performance;
   std::fputs(text.c_str(), stdout);
   return 0;
 }
@@ -79,6 +89,8 @@ RunVerb defineInspect(CLI::App& app) {
       ->type_name("F.png");
   app.add_option("--combinations", options->combinations, "for a rig: a picture of twelve combined expressions")
       ->type_name("F.png");
+  app.add_option("--take", options->take, "for a rig: measure this performance on it too, frame by frame")
+      ->type_name("TAKE");
   app.add_option("--cell", options->cell_px, "size of a cell of these sheets")
       ->type_name("PX")
       ->capture_default_str()

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <unordered_map>
 
@@ -441,6 +442,31 @@ void sinkNostrils(HalfMesh& mesh) {
   for (HalfVertex& v : mesh.vertices)
     if (v.strip == Strip::nostril && v.ring > kNostrilRim)
       v.position = v.position + kNostrilInward * (0.34 * std::sqrt(v.ring - kNostrilRim));
+}
+
+void startAtBetterCorner(HalfMesh& mesh) {
+  constexpr double kSliver = 0.2, kBetter = 1.5;
+  for (Polygon& polygon : mesh.polygons) {
+    if (polygon.corners.size() != 4) continue;
+    const auto at = [&](std::size_t c) {
+      return mesh.vertices[static_cast<std::size_t>(polygon.corners[c % 4])].position;
+    };
+    const Vec3 facing = normalized(cross(at(2) - at(0), at(3) - at(1)));
+    // Of the worse of the two triangles: its area, as the quad sees it, in squares of its longest edge.
+    const auto roundness = [&](std::size_t first) {
+      double worst = 1;
+      for (const std::size_t c : {first + 1, first + 2}) {
+        const Vec3 a = at(first), b = at(c), d = at(c + 1);
+        const double longest = std::fmax(length(b - a), std::fmax(length(d - b), length(a - d)));
+        worst = std::fmin(worst, dot(cross(b - a, d - a), facing) / (longest * longest));
+      }
+      return worst;
+    };
+    const double now = roundness(0);
+    if (now > kSliver || roundness(1) < kBetter * now) continue;
+    std::rotate(polygon.corners.begin(), polygon.corners.begin() + 1, polygon.corners.end());
+    if (!polygon.uv.empty()) std::rotate(polygon.uv.begin(), polygon.uv.begin() + 1, polygon.uv.end());
+  }
 }
 
 void relax(HalfMesh& mesh, int rounds, double strength) {

@@ -74,6 +74,10 @@ void sinkNostrils(HalfMesh& mesh);
 // design", 1995); lids, lips, nostrils, ears and the neck's border stay.
 void polish(HalfMesh& mesh, int rounds);
 
+// Turns the corners of quads so that the fan from the first corner, which is how programs cut a polygon, makes no sliver:
+// of the two diagonals the one whose worse triangle is rounder, where that makes a difference.
+void startAtBetterCorner(HalfMesh& mesh);
+
 // Evens out the skin vertices: each moves toward the middle of its neighbours by `strength` and back onto the field.
 void relax(HalfMesh& mesh, int rounds, double strength);
 

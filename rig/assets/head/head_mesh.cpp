@@ -188,6 +188,7 @@ Head makeHead(const Character& character) {
   tintSkin(character.tints, skin);
   raiseHair(skin, character.proportions.hair_thickness);
   sinkNostrils(skin);
+  startAtBetterCorner(skin);
   const Proportions& proportions = character.proportions;
   HalfMesh reshaped_skin = skin, eyeball = makeEyeball(proportions.iris_size, proportions.pupil_size);
   HalfMesh upper_teeth = makeUpperTeeth(), lower_teeth = makeLowerTeeth(), tongue = makeTongue();

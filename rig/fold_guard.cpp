@@ -1,0 +1,144 @@
+#include "rig/fold_guard.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "rig/combined_expressions.h"
+#include "rig/contacts.h"
+#include "rig/pose.h"
+#include "rig/rig.h"
+#include "rig/skin.h"
+
+namespace volto::rig {
+namespace {
+
+constexpr float kGiven = 3;           // of `least`, to a triangle that has less than it
+constexpr float kLeast = 0.01F;       // of its area at rest
+constexpr float kWatched = 0.35F;     // a triangle that some expression brings below this share of its area
+constexpr float kLeastArea = 1e-9F;   // in squares of the eye separation: what is smaller at rest has no direction
+
+using Vec3 = std::array<float, 3>;
+
+[[gnu::always_inline]] inline Vec3 minus(const Vec3& a, const Vec3& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+[[gnu::always_inline]] inline Vec3 cross(const Vec3& a, const Vec3& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+[[gnu::always_inline]] inline float dot(const Vec3& a, const Vec3& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+}  // namespace
+
+std::size_t unfoldOnce(const FoldGuard& guard, std::size_t count, std::span<Vec3> positions) {
+  std::size_t lacking = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto& [a, b, c] = guard.triangle[i];
+    const Vec3 &pa = positions[a], &pb = positions[b], &pc = positions[c], &n = guard.normal[i];
+    const Vec3 ab = minus(pb, pa), ac = minus(pc, pa);
+    const float shown = dot(n, cross(ab, ac));
+    if (!(shown < guard.least[i])) continue;
+    ++lacking;
+    // Gradients: each corner straight away from the opposite edge, as seen along n.
+    const Vec3 of_a = cross(minus(pb, pc), n), of_b = cross(ac, n), of_c = cross(n, ab);
+    const float squared = dot(of_a, of_a) + dot(of_b, of_b) + dot(of_c, of_c);
+    if (!(squared > 2 * guard.least[i])) continue;  // shrunk to a point: there is no way out of it
+    // More than what is missing, so that rounds end.
+    const float by = (kGiven * guard.least[i] - shown) / squared;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      positions[a][axis] += by * of_a[axis];
+      positions[b][axis] += by * of_b[axis];
+      positions[c][axis] += by * of_c[axis];
+    }
+  }
+  if (lacking > 0)
+    for (const auto& [copy, original] : guard.copies) positions[copy] = positions[original];
+  return lacking;
+}
+
+FoldGuard guardAgainstFolds(const Rig& rig, const Skin& skin) {
+  const std::vector<Position> neutral = neutralPositions(rig);
+  const auto es = static_cast<float>(rig.fapu.fapu.eye_separation);
+  const auto moves = [&](std::uint32_t v) {
+    return (rig.association.kind[v] == AssociationKind::ray || rig.association.kind[v] == AssociationKind::geodesic) &&
+           rig.deformation.row_start[v] < rig.deformation.row_start[v + 1];
+  };
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  std::vector<Vec3> normals;
+  std::vector<float> areas;
+  for (std::array<std::uint32_t, 3> t : triangulate(rig.neutral)) {
+    if (!std::all_of(t.begin(), t.end(), moves)) continue;
+    for (std::uint32_t& v : t) v = skin.same_as[v];
+    const Vec3 normal = cross(minus(neutral[t[1]], neutral[t[0]]), minus(neutral[t[2]], neutral[t[0]]));
+    const float area = std::sqrt(dot(normal, normal));
+    if (!(area > kLeastArea * es * es)) continue;
+    triangles.push_back(t);
+    normals.push_back({normal[0] / area, normal[1] / area, normal[2] / area});
+    areas.push_back(area);
+  }
+
+  // Every shape half way and all the way, every pair that has a correction, every combined expression.
+  std::vector<std::uint8_t> watched(triangles.size(), 0);
+  std::vector<Position> positions(neutral.size());
+  std::vector<float> weights(rig.blendshapes.size(), 0.0F);
+  Contacts contacts = rig.contacts;
+  contacts.folds = {};
+  contacts.riders.clear();
+  const auto look = [&] {
+    poseByOperator(rig, weights, neutral, positions);
+    addToPose(rig, weights, false, neutral, positions);
+    resolveContacts(contacts, neutral, positions);
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+      const auto& [a, b, c] = triangles[t];
+      const Vec3 now = cross(minus(positions[b], positions[a]), minus(positions[c], positions[a]));
+      if (dot(normals[t], now) < kWatched * areas[t]) watched[t] = 1;
+    }
+    std::fill(weights.begin(), weights.end(), 0.0F);
+  };
+  for (std::size_t k = 0; k < weights.size(); ++k)
+    for (const float w : {0.5F, 1.0F}) {
+      weights[k] = w;
+      look();
+    }
+  for (const Combination& combination : rig.combinations) {
+    for (const Combination::Driver& driver : combination.drivers) weights[driver.shape] = driver.halfway ? 0.5F : 1.0F;
+    look();
+  }
+  for (const NamedPose& pose : combinedExpressions()) {
+    for (const auto& [name, weight] : pose.weights)
+      for (std::size_t k = 0; k < weights.size(); ++k)
+        if (rig.blendshapes[k].name == name) weights[k] = weight;
+    look();
+  }
+
+  // Two rings around: what may have to give way.
+  std::vector<std::uint8_t> near(neutral.size(), 0), in(triangles.size(), 0);
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+    if (watched[t] != 0)
+      for (const std::uint32_t v : triangles[t]) near[v] = 1;
+  for (int ring = 0; ring < 2; ++ring) {
+    for (std::size_t t = 0; t < triangles.size(); ++t)
+      for (const std::uint32_t v : triangles[t])
+        if (near[v] != 0) in[t] = 1;
+    for (std::size_t t = 0; t < triangles.size(); ++t)
+      if (in[t] != 0)
+        for (const std::uint32_t v : triangles[t]) near[v] = 1;
+  }
+  FoldGuard out;
+  for (const bool first : {true, false}) {
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+      if (in[t] == 0 || (watched[t] != 0) != first) continue;
+      out.triangle.push_back(triangles[t]);
+      out.normal.push_back(normals[t]);
+      out.least.push_back(kLeast * areas[t]);
+    }
+    if (first) out.watched = out.triangle.size();
+  }
+  for (std::uint32_t v = 0; v < neutral.size(); ++v)
+    if (skin.same_as[v] != v && near[skin.same_as[v]] != 0 && neutral[v] == neutral[skin.same_as[v]])
+      out.copies.push_back({v, skin.same_as[v]});
+  return out;
+}
+
+}  // namespace volto::rig
