@@ -139,11 +139,35 @@ struct HealthMeasure::State {
         at_border |= nearest.barycentric[k] > 1e-6 && other.border.contains(t[k]);
       }
       if (at_border) continue;
-      // Two surfaces that meet face each other; the inside of a lid near the other lid's inside does not count.
-      const Eigen::Vector3d normal = normalOf(pose, t);
+      // Two surfaces that meet face each other; the inside of a lid near the other lid's inside does not count. On an
+      // edge or a vertex all around it say what is inside (Baerentzen, Aanaes, "Signed distance computation using the
+      // angle weighted pseudonormal", 2005).
+      const Eigen::Vector3d normal = pseudonormal(other, t, nearest.barycentric, pose);
       if (normal.dot(p - q) < 0 && normal.dot(vertexNormal(side, side.probes[i], pose)) < 0) out[i] = nearest.distance;
     }
     return out;
+  }
+
+  static Eigen::Vector3d pseudonormal(const Side& side, const Triangle& t, const auto& barycentric,
+                                      std::span<const Vertex> pose) {
+    Triangle on{};
+    std::size_t count = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (barycentric[k] > 1e-6) on[count++] = t[k];
+    }
+    if (count == 3) return normalOf(pose, t);
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const std::uint32_t i : side.around.at(on[0])) {
+      const Triangle& u = side.triangles[i];
+      const auto corner = std::find(u.begin(), u.end(), on[0]);
+      if (count == 2 && std::find(u.begin(), u.end(), on[1]) == u.end()) continue;
+      const Eigen::Vector3d unit = normalOf(pose, u).normalized();
+      const auto k = static_cast<std::size_t>(corner - u.begin());
+      const Eigen::Vector3d a = at(pose, u[k]);
+      const Eigen::Vector3d b = at(pose, u[(k + 1) % 3]) - a, c = at(pose, u[(k + 2) % 3]) - a;
+      sum += (count == 2 ? 1.0 : std::atan2(b.cross(c).norm(), b.dot(c))) * unit;
+    }
+    return sum;
   }
 
   static Eigen::Vector3d vertexNormal(const Side& side, std::uint32_t v, std::span<const Vertex> pose) {

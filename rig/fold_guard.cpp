@@ -14,7 +14,7 @@ namespace {
 
 constexpr float kGiven = 3;           // of `least`, to a triangle that has less than it
 constexpr float kLeast = 0.01F;       // of its area at rest
-constexpr float kWatched = 0.35F;     // a triangle that some expression brings below this share of its area
+constexpr float kWatched = 0.5F;      // a triangle that some expression brings below this share of its area
 constexpr float kLeastArea = 1e-9F;   // in squares of the eye separation: what is smaller at rest has no direction
 
 using Vec3 = std::array<float, 3>;
@@ -111,6 +111,16 @@ FoldGuard guardAgainstFolds(const Rig& rig, const Skin& skin) {
         if (rig.blendshapes[k].name == name) weights[k] = weight;
     look();
   }
+
+  // And the rims of lids and lips, which every mixture of expressions presses against each other.
+  constexpr float kRim = 0.9F;
+  std::vector<std::uint8_t> rim(neutral.size(), 0);
+  for (const SlitContact& slit : contacts.slits)
+    for (std::size_t i = 0; i < slit.vertex.size(); ++i)
+      if (std::abs(slit.share[i]) > kRim) rim[skin.same_as[slit.vertex[i]]] = 1;
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+    if (std::any_of(triangles[t].begin(), triangles[t].end(), [&](std::uint32_t v) { return rim[v] != 0; }))
+      watched[t] = 1;
 
   // Two rings around: what may have to give way.
   std::vector<std::uint8_t> near(neutral.size(), 0), in(triangles.size(), 0);
