@@ -22,8 +22,9 @@ using Vec3 = std::array<float, 3>;
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-void keepOnBall(const BallContact& ball, std::span<Vec3> positions) {
-  const bool held = !ball.hold.empty();
+// With `drawn_back`, what was lifted off comes back too.
+void keepOnBall(const BallContact& ball, bool drawn_back, std::span<Vec3> positions) {
+  const bool held = drawn_back && !ball.hold.empty();
   for (std::size_t i = 0; i < ball.vertex.size(); ++i) {
     Vec3& p = positions[ball.vertex[i]];
     const Vec3 arm = p - ball.centre;
@@ -142,7 +143,7 @@ void unfold(const Contacts& contacts, std::span<Vec3> positions) {
   if (contacts.folds.empty() || unfoldOnce(contacts.folds, contacts.folds.watched, positions) == 0) return;
   for (int round = 1; round < kMostRounds; ++round) {
     if (round % kBallsEvery == 0)
-      for (const BallContact& ball : contacts.balls) keepOnBall(ball, positions);
+      for (const BallContact& ball : contacts.balls) keepOnBall(ball, false, positions);
     if (unfoldOnce(contacts.folds, contacts.folds.triangle.size(), positions) == 0) return;
   }
 }
@@ -184,10 +185,10 @@ std::array<float, kMaxSlitColumns> slitGaps(const SlitContact& slit, std::span<c
 }
 
 void resolveContacts(const Contacts& contacts, std::span<const Vec3> neutral, std::span<Vec3> positions) {
-  for (const BallContact& ball : contacts.balls) keepOnBall(ball, positions);
+  for (const BallContact& ball : contacts.balls) keepOnBall(ball, true, positions);
   for (const SlitContact& slit : contacts.slits) partSides(slit, ballOf(contacts, slit.ball), positions);
   if (!contacts.slits.empty())
-    for (const BallContact& ball : contacts.balls) keepOnBall(ball, positions);
+    for (const BallContact& ball : contacts.balls) keepOnBall(ball, false, positions);
   unfold(contacts, positions);
   for (const Rider& rider : contacts.riders) ride(rider, ballOf(contacts, rider.ball), neutral, positions);
 }

@@ -128,6 +128,46 @@ class CorrectionMaker {
     rig_.blendshapes[k].correction = lab_.sparse(extra);
   }
 
+  // Funnel and pucker both bring the lips forward. Together they do not bring them twice as far.
+  void shareProtrusion(std::size_t shape, DenseDisplacement& extra) {
+    constexpr float kSpared = 0.45F;
+    lab_.setWeights(weightsOf({shape}));
+    for (std::uint32_t v = 0; v < extra.size(); ++v)
+      if (rig_.association.kind[v] != AssociationKind::rigid_part)
+        extra[v] -= kSpared * (toVec(lab_.beforeContacts()[v]) - lab_.rest(v));
+  }
+
+  // Lips that close over an open jaw draw the chin's skin up: the jaw goes along, lest the teeth come through it. What
+  // is added to a part's vertices is turned with the part afterwards, so turning back by a share of the angle first
+  // leaves the rest of it.
+  void keepJawInChin(std::size_t close, std::size_t open, DenseDisplacement& extra) {
+    const std::int32_t chin = rig_.feature_vertex[featurePointIndex("2.10").value()];
+    if (chin < 0) return;
+    const auto v = static_cast<std::uint32_t>(chin);
+    lab_.setWeights(weightsOf({open}));
+    lab_.evaluate(lab_.nothing());
+    const Vec alone = lab_.at(v) - lab_.rest(v);
+    lab_.setWeights(weightsOf({close, open}));
+    lab_.evaluate(lab_.nothing());
+    const Vec both = lab_.at(v) - lab_.rest(v);
+    if (!(alone.squaredNorm() > 0)) return;
+    const float left = std::clamp(both.dot(alone) / alone.squaredNorm(), 0.2F, 1.0F);
+    for (const PartMotion& motion : rig_.part_motions) {
+      if (motion.follows != RigidPart::Follows::jaw) continue;
+      for (const PartMotion::Turn& turn : motion.turns) {
+        if (turn.shape != open) continue;
+        const Vec rotation = (left - 1) * toVec(turn.rotation), pivot = toVec(motion.pivot);
+        const float angle = rotation.norm();
+        if (!(angle > 1e-6F)) continue;
+        const Eigen::Matrix3f back = Eigen::AngleAxisf(angle, rotation / angle).toRotationMatrix();
+        for (std::size_t i = 0; i < motion.vertices.size(); ++i) {
+          const Vec arm = lab_.rest(motion.vertices[i]) - pivot;
+          extra[motion.vertices[i]] += motion.share[i] * (back * arm - arm);
+        }
+      }
+    }
+  }
+
   void forSides(const Pair& pair) {
     if (!pair.sided) return combine(std::string(pair.first), std::string(pair.second));
     for (const std::string side : {"Left", "Right"}) {
@@ -140,13 +180,16 @@ class CorrectionMaker {
   void combine(const std::string& first, const std::string& second) {
     const auto a = indexOf(first), b = indexOf(second);
     if (!a || !b) return;
-    lab_.setWeights(weightsOf({*a, *b}));
     DenseDisplacement extra = lab_.nothing();
-    const SlitContact* lids = !first.starts_with("eyeBlink") ? nullptr
-                              : first.ends_with("Left")      ? slitAt(SlitContact::Place::left_eye)
-                                                             : slitAt(SlitContact::Place::right_eye);
-    if (lids != nullptr) {
-      closeWithoutFolds(*lids, extra);
+    if (first == "mouthFunnel" && second == "mouthPucker") shareProtrusion(*b, extra);
+    if (first == "mouthClose" && second == "jawOpen") keepJawInChin(*a, *b, extra);
+    lab_.setWeights(weightsOf({*a, *b}));
+    const SlitContact* closing = nullptr;
+    if (first.starts_with("eyeBlink"))
+      closing = slitAt(first.ends_with("Left") ? SlitContact::Place::left_eye : SlitContact::Place::right_eye);
+    if (first == "mouthClose") closing = slitAt(SlitContact::Place::mouth);
+    if (closing != nullptr) {
+      closeWithoutFolds(*closing, extra);
     } else {
       lab_.unfold(extra);
     }
@@ -165,9 +208,9 @@ class CorrectionMaker {
     return {all.begin(), all.begin() + static_cast<std::ptrdiff_t>(slit.upper.size())};
   }
 
-  // Leads the margins together along the ball, a little beyond so that a blink that is not quite full closes too;
+  // Leads the margins together, lids along the ball, a little beyond so that a blink that is not quite full closes too;
   // contact keeps them from passing each other.
-  void closeLids(const SlitContact& slit, DenseDisplacement& extra) {
+  void close(const SlitContact& slit, DenseDisplacement& extra) {
     const float beyond = 0.004F * es_;
     const Vec up = toVec(slit.up);
     for (int round = 0; round < 6; ++round) {
@@ -206,12 +249,12 @@ class CorrectionMaker {
         margins.push_back(s.second);
       }
     for (int round = 0; round < 3; ++round) {
-      closeLids(slit, extra);
+      close(slit, extra);
       lab_.unfold(extra, margins);
       const std::vector<float> gap = gaps(slit);
       if (*std::max_element(gap.begin(), gap.end()) < 0.006F * es_) return;
     }
-    closeLids(slit, extra);  // closed is what a blink must be
+    close(slit, extra);  // closed is what a blink must be
   }
 
   // --- cheeks

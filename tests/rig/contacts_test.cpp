@@ -104,6 +104,60 @@ TEST(Contacts, ContactBeginsWithoutAJump) {
   }
 }
 
+TEST(Contacts, LidThatIsLiftedOffTheBallComesBackAsFarAsItIsHeld) {
+  Eye eye;
+  const float at_rest = length(eye.neutral[0]);
+  eye.contacts.balls[0].outer = {at_rest, at_rest};
+  eye.contacts.balls[0].hold = {1.0F, 0.5F};
+  auto pose = eye.neutral;
+  for (const std::size_t v : {0U, 1U})
+    for (float& x : pose[v]) x *= 1.5F;
+  const auto out = eye.resolved(pose);
+  EXPECT_NEAR(length(out[0]), at_rest, 1e-5F);
+  EXPECT_NEAR(length(out[1]), 1.25F * at_rest, 1e-5F);
+}
+
+TEST(Contacts, MarginsAreComparedWhereTheyAreNow) {
+  // Two lips along x, each with a step in its height, of which the lower slides by the step's width: what is opposite
+  // each other now does not pass, though what was opposite at rest does.
+  SlitContact slit;
+  slit.up = {0, 1, 0};
+  const float step[] = {0, 0, 0, 1, 1, 1, 0, 0, 0};
+  std::vector<P> pose;
+  for (int side = 0; side < 2; ++side)
+    for (int k = 0; k < 9; ++k) {
+      const auto v = static_cast<std::uint32_t>(pose.size());
+      (side == 0 ? slit.upper : slit.lower).push_back({v, v, 0});
+      const bool end = k == 0 || k == 8;
+      pose.push_back({static_cast<float>(k) + (side == 1 && !end ? 0.9F : 0.0F), side == 0 ? 0.05F : 0.0F, 0});
+    }
+  for (std::size_t k = 0; k < 9; ++k) pose[k][1] += step[k];
+  // The lower lip's step, after it slid, lies under the upper's.
+  for (std::size_t k = 1; k < 8; ++k) pose[9 + k][1] += step[std::min<std::size_t>(8, k + 1)];
+  slit.least_gap.assign(9, 0.0F);
+  Contacts contacts;
+  contacts.slits = {slit};
+  EXPECT_LT(measurePenetration(contacts, pose).lips, 0.2F);
+  const auto gaps = slitGaps(slit, pose);
+  EXPECT_NEAR(gaps[4], 0.05F, 1e-4F);
+}
+
+TEST(Contacts, ATriangleThatTurnsOverIsBroughtBack) {
+  const std::vector<P> neutral = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 1, 0}};
+  Contacts contacts;
+  contacts.folds = {{{0, 1, 2}}, 1, {{0, 0, 1}}, {0.01F}, {{{3, 2}}}};
+  auto pose = neutral;
+  pose[2] = pose[3] = {0.2F, -0.1F, 0};
+  resolveContacts(contacts, neutral, pose);
+  const float shown = (pose[1][0] - pose[0][0]) * (pose[2][1] - pose[0][1]) -
+                      (pose[1][1] - pose[0][1]) * (pose[2][0] - pose[0][0]);
+  EXPECT_GE(shown, 0.01F);
+  EXPECT_EQ(pose[3], pose[2]) << "what is at the same place stays there";
+  auto rest = neutral;
+  resolveContacts(contacts, neutral, rest);
+  EXPECT_EQ(rest, neutral);
+}
+
 class PoseData : public ::testing::Test {
  protected:
   Rig rig_ = [] {
@@ -171,6 +225,12 @@ TEST_F(PoseData, WhatDoesNotFitTheMeshIsRefusedWhenRead) {
   refused([&](Rig& r) { r.contacts.balls = {{{0, 0, 0}, 1, {far}, {1}, {}, {}}}; }, "ball's vertex out of range");
   refused([&](Rig& r) { r.contacts.riders = {{0, {0, 0, far}, {1, 0, 0}, -1}}; }, "anchor out of range");
   refused([&](Rig& r) { r.contacts.riders = {{0, {0, 0, 0}, {1, 0, 0}, 5}}; }, "rider's ball");
+  refused([&](Rig& r) { r.contacts.balls = {{{0, 0, 0}, 1, {0}, {1}, {1}, {2}}}; }, "held by more than all");
+  refused([&](Rig& r) { r.contacts.balls = {{{0, 0, 0}, 1, {0}, {1}, {1}, {}}}; }, "hold without outer");
+  refused([&](Rig& r) { r.contacts.folds = {{{0, 1, far}}, 1, {{0, 0, 1}}, {1}, {}}; }, "guarded triangle out of range");
+  refused([&](Rig& r) { r.contacts.folds = {{{0, 1, 2}}, 2, {{0, 0, 1}}, {1}, {}}; }, "more watched than there are");
+  refused([&](Rig& r) { r.contacts.folds = {{{0, 1, 2}}, 1, {{0, nan, 1}}, {1}, {}}; }, "guard's normal not finite");
+  refused([&](Rig& r) { r.contacts.folds = {{{0, 1, 2}}, 1, {{0, 0, 1}}, {0}, {}}; }, "guard without an area");
   Contacts slit = Eye().contacts;
   slit.balls.clear();
   slit.riders.clear();
