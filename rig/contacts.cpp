@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rig/unfold_rounds.h"
+
 namespace volto::rig {
 namespace {
 
@@ -22,8 +24,9 @@ using Vec3 = std::array<float, 3>;
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-// With `drawn_back`, what was lifted off comes back too.
-void keepOnBall(const BallContact& ball, bool drawn_back, std::span<Vec3> positions) {
+// With `drawn_back`, what was lifted off comes back too. `touched` gains what was pushed out.
+void keepOnBall(const BallContact& ball, bool drawn_back, std::span<Vec3> positions,
+                TouchedVertices* touched = nullptr) {
   const bool held = drawn_back && !ball.hold.empty();
   for (std::size_t i = 0; i < ball.vertex.size(); ++i) {
     Vec3& p = positions[ball.vertex[i]];
@@ -31,6 +34,7 @@ void keepOnBall(const BallContact& ball, bool drawn_back, std::span<Vec3> positi
     const float squared = dot(arm, arm), least = ball.distance[i];
     if (squared < least * least) {
       if (squared > 1e-12F * least * least) p = ball.centre + (least / std::sqrt(squared)) * arm;
+      if (touched != nullptr) touched->add(ball.vertex[i]);
     } else if (held && ball.hold[i] > 0 && squared > ball.outer[i] * ball.outer[i]) {
       const float distance = std::sqrt(squared);
       p = ball.centre + ((distance + ball.hold[i] * (ball.outer[i] - distance)) / distance) * arm;
@@ -141,10 +145,15 @@ void partSides(const SlitContact& slit, const BallContact* ball, std::span<Vec3>
 void unfold(const Contacts& contacts, std::span<Vec3> positions) {
   constexpr int kMostRounds = 24, kBallsEvery = 4;
   if (contacts.folds.empty() || unfoldOnce(contacts.folds, contacts.folds.watched, positions) == 0) return;
+  std::array<TouchedVertices, 2> touched;
+  touched[0].addAll();
   for (int round = 1; round < kMostRounds; ++round) {
+    TouchedVertices &before = touched[static_cast<std::size_t>(round + 1) % 2],
+                    &now = touched[static_cast<std::size_t>(round) % 2];
+    now.clear();
     if (round % kBallsEvery == 0)
-      for (const BallContact& ball : contacts.balls) keepOnBall(ball, false, positions);
-    if (unfoldOnce(contacts.folds, contacts.folds.triangle.size(), positions) == 0) return;
+      for (const BallContact& ball : contacts.balls) keepOnBall(ball, false, positions, &now);
+    if (unfoldAround(contacts.folds, before, now, positions) == 0) return;
   }
 }
 

@@ -8,6 +8,7 @@
 #include "rig/pose.h"
 #include "rig/rig.h"
 #include "rig/skin.h"
+#include "rig/unfold_rounds.h"
 
 namespace volto::rig {
 namespace {
@@ -29,31 +30,59 @@ using Vec3 = std::array<float, 3>;
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
+// Gives a triangle what it lacks. Returns whether it lacked something; `moved`: and could be helped.
+[[gnu::always_inline]] inline bool bringBack(const FoldGuard& guard, std::size_t i, std::span<Vec3> positions,
+                                             bool& moved) {
+  moved = false;
+  const auto& [a, b, c] = guard.triangle[i];
+  const Vec3 &pa = positions[a], &pb = positions[b], &pc = positions[c], &n = guard.normal[i];
+  const Vec3 ab = minus(pb, pa), ac = minus(pc, pa);
+  const float shown = dot(n, cross(ab, ac));
+  if (!(shown < guard.least[i])) return false;
+  // Gradients: each corner straight away from the opposite edge, as seen along n.
+  const Vec3 of_a = cross(minus(pb, pc), n), of_b = cross(ac, n), of_c = cross(n, ab);
+  const float squared = dot(of_a, of_a) + dot(of_b, of_b) + dot(of_c, of_c);
+  if (!(squared > 2 * guard.least[i])) return true;  // shrunk to a point: there is no way out of it
+  // More than what is missing, so that rounds end.
+  const float by = (kGiven * guard.least[i] - shown) / squared;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    positions[a][axis] += by * of_a[axis];
+    positions[b][axis] += by * of_b[axis];
+    positions[c][axis] += by * of_c[axis];
+  }
+  moved = true;
+  return true;
+}
+
+void moveCopies(const FoldGuard& guard, std::span<Vec3> positions) {
+  for (const auto& [copy, original] : guard.copies) positions[copy] = positions[original];
+}
+
 }  // namespace
 
 std::size_t unfoldOnce(const FoldGuard& guard, std::size_t count, std::span<Vec3> positions) {
   std::size_t lacking = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    const auto& [a, b, c] = guard.triangle[i];
-    const Vec3 &pa = positions[a], &pb = positions[b], &pc = positions[c], &n = guard.normal[i];
-    const Vec3 ab = minus(pb, pa), ac = minus(pc, pa);
-    const float shown = dot(n, cross(ab, ac));
-    if (!(shown < guard.least[i])) continue;
-    ++lacking;
-    // Gradients: each corner straight away from the opposite edge, as seen along n.
-    const Vec3 of_a = cross(minus(pb, pc), n), of_b = cross(ac, n), of_c = cross(n, ab);
-    const float squared = dot(of_a, of_a) + dot(of_b, of_b) + dot(of_c, of_c);
-    if (!(squared > 2 * guard.least[i])) continue;  // shrunk to a point: there is no way out of it
-    // More than what is missing, so that rounds end.
-    const float by = (kGiven * guard.least[i] - shown) / squared;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      positions[a][axis] += by * of_a[axis];
-      positions[b][axis] += by * of_b[axis];
-      positions[c][axis] += by * of_c[axis];
-    }
+    bool moved = false;
+    lacking += bringBack(guard, i, positions, moved) ? 1 : 0;
   }
-  if (lacking > 0)
-    for (const auto& [copy, original] : guard.copies) positions[copy] = positions[original];
+  if (lacking > 0) moveCopies(guard, positions);
+  return lacking;
+}
+
+std::size_t unfoldAround(const FoldGuard& guard, const TouchedVertices& before, TouchedVertices& now,
+                         std::span<Vec3> positions) {
+  std::size_t lacking = 0;
+  const auto touched = [&](std::uint32_t v) { return before.has(v) || now.has(v); };
+  for (std::size_t i = 0; i < guard.triangle.size(); ++i) {
+    const auto& [a, b, c] = guard.triangle[i];
+    if (!touched(a) && !touched(b) && !touched(c)) continue;
+    bool moved = false;
+    lacking += bringBack(guard, i, positions, moved) ? 1 : 0;
+    if (!moved) continue;
+    for (const std::uint32_t v : guard.triangle[i]) now.add(v);
+  }
+  if (lacking > 0) moveCopies(guard, positions);
   return lacking;
 }
 
