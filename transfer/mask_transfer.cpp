@@ -56,7 +56,7 @@ MaskTransfer::MaskTransfer(const rig::Rig& source, const rig::Rig& target)
   }
 }
 
-rig::VertexPositions MaskTransfer::transfer(const rig::VertexPositions& example) const {
+rig::VertexPositions MaskTransfer::pointDisplacements(const rig::VertexPositions& example) const {
   rig::VertexPositions points(static_cast<Eigen::Index>(readings_.size()), 3);
   for (std::size_t p = 0; p < readings_.size(); ++p) {
     const Reading& r = readings_[p];
@@ -65,7 +65,11 @@ rig::VertexPositions MaskTransfer::transfer(const rig::VertexPositions& example)
       moved += r.weight[i] * (example.row(r.vertex[i]) - source_.neutral.positions.row(r.vertex[i])).transpose();
     points.row(static_cast<Eigen::Index>(p)) = (r.target_from_source * moved).transpose();
   }
-  return target_.neutral.positions + rig::displaceVertices(mask_, points);
+  return points;
+}
+
+rig::VertexPositions MaskTransfer::transfer(const rig::VertexPositions& example) const {
+  return target_.neutral.positions + rig::displaceVertices(mask_, pointDisplacements(example));
 }
 
 }  // namespace volto::transfer

@@ -27,6 +27,9 @@ class MaskTransfer {
   std::size_t sourcePointCount() const { return source_points_; }
   std::size_t targetPointCount() const { return mask_.pointCount(); }
 
+  // #M by 3: how the points of the target's mask move, its frame and unit.
+  rig::VertexPositions pointDisplacements(const rig::VertexPositions& example) const;
+
   // `example`: #V by 3 of the source. Result: #V by 3 of the target, its frame and unit; contacts are not looked at.
   rig::VertexPositions transfer(const rig::VertexPositions& example) const;
 
