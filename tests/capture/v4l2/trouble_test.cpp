@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/capture/fake/troubles.h"
 #include "tests/capture/v4l2/camera_stage.h"
 
 namespace volto::capture {
@@ -364,54 +365,6 @@ TEST(Busy, WhileItWasAwayIsWaitedOutAndTheHolderNamed) {
 
 // Anything may happen at any time: nothing is left open, nothing hangs, and when all is well again pictures come.
 TEST(RandomTrouble, IsSurvivedFiveHundredTimes) {
-  const std::vector<std::string> kLines{"unplug",
-                                        "replug as video1",
-                                        "replug as video4",
-                                        "busy",
-                                        "free",
-                                        "open EACCES 2",
-                                        "open ENXIO 1",
-                                        "s_fmt EBUSY 2",
-                                        "s_fmt adjust 320x180",
-                                        "s_parm adjust 1/15",
-                                        "reqbufs grant 1",
-                                        "reqbufs ENOMEM 1",
-                                        "querybuf offset bad",
-                                        "mmap ENOMEM 2",
-                                        "streamon ENOSPC 1",
-                                        "streamon EIO 2",
-                                        "dqbuf EIO 3",
-                                        "dqbuf EIO forever",
-                                        "dqbuf index 77 2",
-                                        "qbuf EIO 1",
-                                        "fatal",
-                                        "bytesused 0 40",
-                                        "bytesused short",
-                                        "bytesused length+1 3",
-                                        "flag_error p=0.5",
-                                        "freeze 2500ms",
-                                        "freeze streamoff",
-                                        "freeze reopen",
-                                        "drop p=0.9",
-                                        "ts +3600s",
-                                        "ts -1s",
-                                        "ts 0",
-                                        "ts realtime",
-                                        "seq wrap",
-                                        "seq stuck",
-                                        "fps 3",
-                                        "fps 90",
-                                        "mjpg truncate",
-                                        "mjpg bitflip",
-                                        "mjpg garbage p=0.5",
-                                        "mjpg progressive",
-                                        "mjpg 65535x65535",
-                                        "eintr every 3",
-                                        "pollin spurious forever",
-                                        "enum only ZZZZ",
-                                        "querycap ENODEV 1",
-                                        "ok",
-                                        "chmod"};
   std::uint32_t seed = 1;
   const auto random = [&seed](std::size_t below) {
     seed = seed * 1664525U + 1013904223U;
@@ -421,7 +374,8 @@ TEST(RandomTrouble, IsSurvivedFiveHundredTimes) {
     std::string script = random(2) == 0 ? "formats YUYV 64x48@30\n" : "formats MJPG 64x48@30\n";
     const std::size_t faults = 1 + random(6);
     for (std::size_t i = 0; i < faults; ++i)
-      script += "at " + std::to_string(random(200)) + " " + kLines[random(kLines.size())] + "\n";
+      script += "at " + std::to_string(random(200)) + " " +
+                std::string(fake::kTroubles[random(fake::kTroubles.size())]) + "\n";
     Stage stage(script);
     const std::int64_t deadline = stage.system.nowNs() + 12 * kSecond;
     while (stage.system.nowNs() < deadline) {
