@@ -361,6 +361,32 @@ class ContactFinder {
     return *most > 0.3 * total ? static_cast<SlitSide>(most - following.begin()) : SlitSide::none;
   }
 
+  // The slit that lashes of a lid grow around; null where it was not found.
+  const SlitContact* slitOf(SlitSide lid) const {
+    const bool left = lid == SlitSide::left_upper_lid || lid == SlitSide::left_lower_lid;
+    for (const SlitContact& s : out_.slits)
+      if (lid != SlitSide::none && s.place == (left ? SlitContact::Place::left_eye : SlitContact::Place::right_eye)) return &s;
+    return nullptr;
+  }
+
+  // The nearest place on the edges that the eye's margins run along: of both lids, since one piece may hold the lashes of
+  // both.
+  void anchorAtMargin(const SlitContact& slit, Rider& rider) const {
+    double least = 1e300;
+    for (const auto* margin : {&slit.upper, &slit.lower}) {
+      for (const SlitContact::Sample& s : *margin) {
+        const Eigen::Vector3d from = position(s.first), along = position(s.second) - from;
+        const double length2 = along.squaredNorm();
+        const double t = length2 > 0 ? std::clamp((position(rider.vertex) - from).dot(along) / length2, 0.0, 1.0) : 0.0;
+        const double distance = (from + t * along - position(rider.vertex)).squaredNorm();
+        if (distance >= least) continue;
+        least = distance;
+        rider.anchor = {s.first, s.second, s.first};
+        rider.weight = {static_cast<float>(1 - t), static_cast<float>(t), 0};
+      }
+    }
+  }
+
   void addRiders(const RigidPart& part, const ClosestPoint& all,
                  const std::vector<std::array<std::uint32_t, 3>>& skin) {
     const double near = 0.1 * es_;
@@ -390,6 +416,8 @@ class ContactFinder {
     std::vector<std::size_t> roots;
     for (std::size_t i = 0; i < nearest.size(); ++i)
       if (nearest[i].triangle >= 0 && nearest[i].distance < closest + 0.015 * es_) roots.push_back(i);
+    // ... at the lid's margin: the tips of broad lashes come near the skin again, farther up, which goes another way.
+    const SlitContact* const slit = by_roots ? slitOf(lid) : nullptr;
     const bool left = lid == SlitSide::left_upper_lid || lid == SlitSide::left_lower_lid;
     for (std::size_t i = 0; i < part.vertices.size(); ++i) {
       std::size_t root = i;
@@ -401,8 +429,12 @@ class ContactFinder {
       if (nearest[root].triangle < 0 || !moves(part.vertices[i])) continue;
       Rider rider;
       rider.vertex = part.vertices[i];
-      rider.anchor = surface.triangle(nearest[root].triangle);
-      for (std::size_t k = 0; k < 3; ++k) rider.weight[k] = static_cast<float>(nearest[root].barycentric[k]);
+      if (slit != nullptr) {
+        anchorAtMargin(*slit, rider);
+      } else {
+        rider.anchor = surface.triangle(nearest[root].triangle);
+        for (std::size_t k = 0; k < 3; ++k) rider.weight[k] = static_cast<float>(nearest[root].barycentric[k]);
+      }
       rider.ball = lid == SlitSide::none ? -1 : ball_of_[left];
       out_.riders.push_back(rider);
     }
