@@ -195,7 +195,7 @@ SkinAssociation associateSkin(const Mesh& mesh, const Skin& skin, const std::vec
   for (const SkinPoint& point : on_skin)
     for (const GeodesicSource& s : point.around)
       if (!out.on_mask[s.vertex]) covered.push_back(s);
-  out.beyond = geodesicDistances(skin.graph, covered, static_cast<float>(fade_out)).distance;
+  out.beyond = surfaceDistances(skin.graph, covered, static_cast<float>(fade_out)).distance;
   std::vector<GeodesicSource> sources;
   std::vector<std::size_t> point_of_source;
   for (std::size_t p = 0; p < on_skin.size(); ++p)

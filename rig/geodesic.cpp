@@ -1,6 +1,7 @@
 #include "rig/geodesic.h"
 
 #include <algorithm>
+#include <cmath>
 #include <queue>
 #include <tuple>
 
@@ -69,6 +70,64 @@ GeodesicDistances geodesicDistances(const EdgeGraph& graph, std::span<const Geod
     }
   }
   // What was only looked at, not settled, cannot remain: everything within the limit gets settled.
+  return out;
+}
+
+namespace {
+
+// Distance at the third corner of a triangle from those at the ends of its base; infinite where the straight way does
+// not cross the base. The corner lies `to_a` and `to_b` from the ends, which are `base` apart.
+float acrossTriangle(float a, float b, float base, float to_a, float to_b) {
+  if (!(base > 0)) return kUnreached;
+  const float source_x = (a * a - b * b + base * base) / (2 * base);
+  const float source_y = std::sqrt(std::max(0.0F, a * a - source_x * source_x));
+  const float x = (to_a * to_a - to_b * to_b + base * base) / (2 * base);
+  const float y = std::sqrt(std::max(0.0F, to_a * to_a - x * x));
+  if (!(y > 1e-4F * base)) return kUnreached;
+  const float crossing = source_x + (x - source_x) * source_y / (source_y + y);
+  if (!(crossing >= 0 && crossing <= base)) return kUnreached;
+  return std::hypot(x - source_x, y + source_y);
+}
+
+}  // namespace
+
+GeodesicDistances surfaceDistances(const EdgeGraph& graph, std::span<const GeodesicSource> sources, float limit) {
+  GeodesicDistances out;
+  out.distance.assign(graph.vertexCount(), kUnreached);
+  out.nearest_source.assign(graph.vertexCount(), -1);
+  std::vector<bool> settled(graph.vertexCount(), false);
+  using Entry = std::tuple<float, std::int32_t, std::uint32_t>;  // distance, source, vertex
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
+  const auto offer = [&](float distance, std::int32_t source, std::uint32_t v) {
+    if (!(distance <= limit) || !(distance < out.distance[v])) return;
+    out.distance[v] = distance;
+    out.nearest_source[v] = source;
+    queue.emplace(distance, source, v);
+  };
+  for (std::size_t s = 0; s < sources.size(); ++s)
+    offer(sources[s].distance, static_cast<std::int32_t>(s), sources[s].vertex);
+  while (!queue.empty()) {
+    const auto [distance, source, v] = queue.top();
+    queue.pop();
+    if (settled[v] || distance > out.distance[v]) continue;
+    settled[v] = true;
+    for (std::uint32_t e = graph.start[v]; e < graph.start[v + 1]; ++e) {
+      const std::uint32_t u = graph.neighbour[e];
+      if (settled[u]) continue;
+      offer(distance + graph.length[e], source, u);
+      // Triangles of u, v and a third vertex that is settled: neighbours of both, in ascending order in both lists.
+      std::uint32_t i = graph.start[v], j = graph.start[u];
+      while (i < graph.start[v + 1] && j < graph.start[u + 1]) {
+        const std::uint32_t a = graph.neighbour[i], b = graph.neighbour[j];
+        if (a == b && settled[a]) {
+          const float across = acrossTriangle(distance, out.distance[a], graph.length[i], graph.length[e], graph.length[j]);
+          offer(std::max(across, distance), source, u);
+        }
+        i += a <= b ? 1 : 0;
+        j += b <= a ? 1 : 0;
+      }
+    }
+  }
   return out;
 }
 

@@ -42,4 +42,11 @@ struct GeodesicDistances {
 GeodesicDistances geodesicDistances(const EdgeGraph& graph, std::span<const GeodesicSource> sources,
                                     float limit = kUnreached);
 
+// The same across the triangles of the surface too, not along their edges alone: a path may enter a triangle of the
+// graph through an edge whose both ends are known (the source unfolded into the triangle's plane, as in Novotni and
+// Klein, "Computing geodesic distances on triangular meshes"). What comes out hardly depends on how the surface is cut
+// into triangles; several times slower. Sources side by side count with the edge between them.
+GeodesicDistances surfaceDistances(const EdgeGraph& graph, std::span<const GeodesicSource> sources,
+                                   float limit = kUnreached);
+
 }  // namespace volto::rig

@@ -29,65 +29,98 @@ VertexPositions displaced(const Rig& rig, const Blendshape& shape) {
   return out;
 }
 
+// What one side of an edge across a border says about the middle of the edge: a plane through the values of the vertices
+// next to the edge's end that are of the end's own triangle, least squares in the surface's tangent.
 class Jumps {
  public:
-  Jumps(const Mesh& mesh, const EdgeGraph& graph, const std::vector<std::int16_t>& triangle)
-      : mesh_(mesh), graph_(graph), triangle_(triangle), inverse_(mesh.vertexCount()), usable_(mesh.vertexCount(), false) {
-    for (std::uint32_t v = 0; v < triangle.size(); ++v) {
-      if (triangle[v] < 0) continue;
-      Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-      int neighbours = 0;
-      for (std::uint32_t e = graph.start[v]; e < graph.start[v + 1]; ++e) {
-        if (triangle[graph.neighbour[e]] != triangle[v]) continue;
-        const Eigen::Vector3d dx = offset(v, graph.neighbour[e]);
-        spread += dx * dx.transpose();
-        ++neighbours;
+  Jumps(const Mesh& mesh, const EdgeGraph& graph, const std::vector<std::int16_t>& triangle) : mesh_(mesh), graph_(graph) {
+    const VertexPositions normals = normalsOf(mesh);
+    for (std::uint32_t a = 0; a < triangle.size(); ++a) {
+      if (triangle[a] < 0) continue;
+      for (std::uint32_t e = graph.start[a]; e < graph.start[a + 1]; ++e) {
+        const std::uint32_t b = graph.neighbour[e];
+        if (b <= a || triangle[b] < 0 || triangle[a] == triangle[b]) continue;
+        Edge edge;
+        if (extrapolate(a, b, triangle, normals, edge.first) && extrapolate(b, a, triangle, normals, edge.second))
+          edges_.push_back(std::move(edge));
       }
-      const double size = spread.trace();
-      // Across the normal nothing is known; along two directions of the surface something must be.
-      const double flat = 0.5 * (size * size - spread.squaredNorm());  // sum of products of two eigenvalues
-      if (neighbours < 3 || !(flat > 1e-3 * size * size)) continue;
-      spread.diagonal().array() += 1e-6 * size;
-      inverse_[v] = spread.inverse();
-      usable_[v] = true;
     }
   }
 
   void add(const VertexPositions& d, BorderJump& sum) const {
-    double jump2 = sum.jump, displacement2 = sum.displacement;
-    for (std::uint32_t a = 0; a < triangle_.size(); ++a) {
-      if (!usable_[a]) continue;
-      const Eigen::Matrix3d gradient_a = gradient(a, d);
-      for (std::uint32_t e = graph_.start[a]; e < graph_.start[a + 1]; ++e) {
-        const std::uint32_t b = graph_.neighbour[e];
-        if (b <= a || !usable_[b] || triangle_[a] == triangle_[b]) continue;
-        const Eigen::Vector3d change = (d.row(b) - d.row(a)).transpose();
-        jump2 += (change - 0.5 * (gradient_a + gradient(b, d)) * offset(a, b)).squaredNorm();
-        displacement2 += 0.5 * (d.row(a).squaredNorm() + d.row(b).squaredNorm());
-        ++sum.edges;
-      }
+    for (const Edge& edge : edges_) {
+      const Eigen::RowVector3d one = valueOf(edge.first, d), other = valueOf(edge.second, d);
+      sum.jump += (one - other).squaredNorm();
+      sum.displacement += 0.5 * (one.squaredNorm() + other.squaredNorm());
+      ++sum.edges;
     }
-    sum.jump = jump2;
-    sum.displacement = displacement2;
   }
 
  private:
-  Eigen::Vector3d offset(std::uint32_t a, std::uint32_t b) const {
-    return (mesh_.positions.row(b) - mesh_.positions.row(a)).transpose();
+  using Row = std::vector<std::pair<std::uint32_t, double>>;  // weights of vertices
+  struct Edge {
+    Row first, second;
+  };
+
+  static VertexPositions normalsOf(const Mesh& mesh) {
+    VertexPositions out = VertexPositions::Zero(mesh.positions.rows(), 3);
+    for (const auto& [a, b, c] : triangulate(mesh)) {
+      const Eigen::RowVector3d normal = Eigen::RowVector3d(mesh.positions.row(b) - mesh.positions.row(a))
+                                            .cross(Eigen::RowVector3d(mesh.positions.row(c) - mesh.positions.row(a)));
+      for (const std::uint32_t v : {a, b, c}) out.row(v) += normal;
+    }
+    return out;
   }
-  Eigen::Matrix3d gradient(std::uint32_t v, const VertexPositions& d) const {
-    Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
-    for (std::uint32_t e = graph_.start[v]; e < graph_.start[v + 1]; ++e)
-      if (const std::uint32_t u = graph_.neighbour[e]; triangle_[u] == triangle_[v])
-        sum += (d.row(u) - d.row(v)).transpose() * offset(v, u).transpose();
-    return sum * inverse_[v];
+
+  // False where the vertices at hand do not say (too few, in one line, all on one side): nothing is better than an
+  // extrapolation that multiplies every unevenness.
+  bool extrapolate(std::uint32_t end, std::uint32_t other, const std::vector<std::int16_t>& triangle,
+                   const VertexPositions& normals, Row& out) const {
+    constexpr double kMostGain = 2.5;
+    const Eigen::Vector3d normal = (normals.row(end).normalized() + normals.row(other).normalized()).normalized();
+    const Eigen::Vector3d middle = 0.5 * (mesh_.positions.row(end) + mesh_.positions.row(other));
+    Eigen::Vector3d along = mesh_.positions.row(other) - mesh_.positions.row(end);
+    along = (along - along.dot(normal) * normal).normalized();
+    const Eigen::Vector3d across = normal.cross(along);
+    if (!normal.allFinite() || !along.allFinite()) return false;
+    const auto take = [&](std::uint32_t v) { out.emplace_back(v, 0.0); };
+    take(end);
+    for (std::uint32_t e = graph_.start[end]; e < graph_.start[end + 1]; ++e)
+      if (triangle[graph_.neighbour[e]] == triangle[end] && normal.dot(normals.row(graph_.neighbour[e])) > 0)
+        take(graph_.neighbour[e]);
+    if (out.size() < 4) return false;
+    const auto rows = static_cast<Eigen::Index>(out.size());
+    Eigen::MatrixXd plane(rows, 3);
+    double size = 0;
+    for (Eigen::Index i = 0; i < rows; ++i) {
+      const Eigen::Vector3d offset = mesh_.positions.row(out[static_cast<std::size_t>(i)].first).transpose() - middle;
+      plane.row(i) << 1, offset.dot(along), offset.dot(across);
+      size += offset.squaredNorm();
+    }
+    size = std::sqrt(size / static_cast<double>(rows));
+    if (!(size > 0)) return false;
+    plane.rightCols<2>() /= size;
+    Eigen::VectorXd near(rows);
+    for (Eigen::Index i = 0; i < rows; ++i) near[i] = std::exp(-0.5 * plane.row(i).tail<2>().squaredNorm());
+    const Eigen::MatrixXd weighted = near.asDiagonal() * plane;
+    const Eigen::Matrix3d normal_matrix = weighted.transpose() * weighted;
+    const Eigen::FullPivLU<Eigen::Matrix3d> solver(normal_matrix);
+    if (solver.rank() < 3) return false;
+    const Eigen::RowVectorXd row = solver.solve(Eigen::Vector3d(1, 0, 0)).transpose() * weighted.transpose() * near.asDiagonal();
+    if (!(row.norm() < kMostGain)) return false;
+    for (Eigen::Index i = 0; i < rows; ++i) out[static_cast<std::size_t>(i)].second = row[i];
+    return true;
+  }
+
+  static Eigen::RowVector3d valueOf(const Row& row, const VertexPositions& d) {
+    Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+    for (const auto& [v, weight] : row) sum += weight * d.row(v);
+    return sum;
   }
 
   const Mesh& mesh_;
   const EdgeGraph& graph_;
-  const std::vector<std::int16_t>& triangle_;
-  std::vector<Eigen::Matrix3d> inverse_;
-  std::vector<bool> usable_;
+  std::vector<Edge> edges_;
 };
 
 void finish(BorderJump& sum) {

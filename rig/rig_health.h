@@ -17,17 +17,19 @@ struct RegionHealth {
   double condition = 0;            // of its RBF's linear system (rig/multiquadric.h)
 };
 
-// How much a displacement field jumps where neighbouring vertices belong to different triangles of the mask, beyond what
-// it changes by anyway. Root mean square over all edges across borders.
+// How much a displacement field jumps where neighbouring vertices belong to different triangles of the mask: at the
+// middle of each edge across a border, the difference of what the two sides say there, each extrapolated linearly from
+// vertices of its own side alone. Zero for a field that is linear across the border; a smooth one leaves about the square of
+// the edge length, so a finer mesh shows less of it and all of a true jump. Root mean square over the edges whose two
+// sides have enough vertices to say anything.
 struct BorderJump {
   double jump = 0;          // mesh unit
-  double displacement = 0;  // of the vertices at those edges
+  double displacement = 0;  // there
   std::size_t edges = 0;
 
   double relative() const { return displacement > 0 ? jump / displacement : 0.0; }
 };
-// For each edge across a border: what the displacement changes by from one end to the other, less what the gradients on
-// its two sides, fitted to the vertices of each side alone, say it should. `displacement`: #V by 3.
+// `displacement`: #V by 3. `triangle`: #V, -1 where a vertex counts for neither side.
 BorderJump borderJump(const Mesh& mesh, const std::vector<std::int16_t>& triangle, const VertexPositions& displacement);
 
 struct RigHealth {

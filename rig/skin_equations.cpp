@@ -11,6 +11,10 @@ namespace {
 
 using Sparse = Eigen::SparseMatrix<double>;
 
+// Where bending gives way to tension, in eye separations: the reach of what a border of the data says about the slope
+// beyond it. Bending alone goes on with that slope deep into the mouth, and a different mesh has a different slope.
+constexpr double kTensionLength = 0.04;
+
 }  // namespace
 
 struct SkinEquations::State {
@@ -35,21 +39,19 @@ SkinEquations::SkinEquations(const Skin& skin, std::span<const std::int32_t> unk
   const auto unknowns = static_cast<Eigen::Index>(data_weight.size());
   const auto vertices = static_cast<std::uint32_t>(skin.same_as.size());
 
-  // Sum over vertices v of |(L x)_v|^2 / area_v = |B x|^2; a neighbour that is no unknown counts with zero.
+  // Sum over unknowns v of |(L x)_v|^2 / area_v = |B x|^2, L among the unknowns alone: free at their outer border.
   std::vector<Eigen::Triplet<double>> entries;
   Eigen::Index stencils = 0;
   for (std::uint32_t v = 0; v < vertices; ++v) {
-    if (!skin.stands(v)) continue;
-    const std::size_t before = entries.size();
+    if (!skin.stands(v) || unknown[v] < 0) continue;
     const double scale = 1 / std::sqrt(areaOf(v));
     double own = 0;
-    for (std::uint32_t e = skin.graph.start[v]; e < skin.graph.start[v + 1]; ++e) {
-      own -= skin.laplacian[e];
-      if (const std::int32_t u = unknown[skin.graph.neighbour[e]]; u >= 0)
+    for (std::uint32_t e = skin.graph.start[v]; e < skin.graph.start[v + 1]; ++e)
+      if (const std::int32_t u = unknown[skin.graph.neighbour[e]]; u >= 0) {
+        own -= skin.laplacian[e];
         entries.emplace_back(stencils, u, scale * skin.laplacian[e]);
-    }
-    if (unknown[v] >= 0) entries.emplace_back(stencils, unknown[v], scale * own);
-    if (entries.size() > before) ++stencils;
+      }
+    entries.emplace_back(stencils++, unknown[v], scale * own);
   }
   Sparse bending(stencils, unknowns);
   bending.setFromTriplets(entries.begin(), entries.end());
@@ -65,6 +67,19 @@ SkinEquations::SkinEquations(const Skin& skin, std::span<const std::int32_t> unk
     // A trace of weight everywhere keeps a piece of skin without any point solvable.
     state_->data_scale[row] = areaOf(v) * (data_weight[row] + 1e-9);
     entries.emplace_back(unknown[v], unknown[v], state_->data_scale[row]);
+  }
+  // Tension along edges, as far as their ends have no data.
+  const auto bare = [&](std::int32_t u) { return data_weight[static_cast<std::size_t>(u)] > 0 ? 0.0 : 0.5; };
+  for (std::uint32_t v = 0; v < vertices; ++v) {
+    if (!skin.stands(v) || unknown[v] < 0) continue;
+    for (std::uint32_t e = skin.graph.start[v]; e < skin.graph.start[v + 1]; ++e) {
+      const std::int32_t u = unknown[skin.graph.neighbour[e]];
+      if (u < 0) continue;
+      const double pull = (bare(unknown[v]) + bare(u)) * skin.laplacian[e] / (kTensionLength * kTensionLength);
+      if (!(pull > 0)) continue;
+      entries.emplace_back(unknown[v], unknown[v], pull);
+      if (u < unknown[v]) entries.emplace_back(unknown[v], u, -pull);
+    }
   }
   // Points are held by a weight far above all others; the rows of points that are vertices are set exactly afterwards.
   for (std::uint32_t p = 0; p < points.size(); ++p) {

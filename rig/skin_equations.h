@@ -22,9 +22,10 @@ struct SkinPoint {
 // One row per unknown, or per control point; one column per right side.
 using Columns = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-// x minimises  sum over vertices of |Laplacian x|^2 area + sum of area data_weight |x - data|^2  (lengths in eye separations), with x held
-// at the control points to their values and zero at all vertices that are no unknowns. Area and Laplacian make the
-// solution one of the surface, not of how densely it is meshed.
+// x minimises  sum over vertices of |Laplacian x|^2 area + sum of area data_weight |x - data|^2 + tension |grad x|^2 area
+// where there is no data  (lengths in eye separations), with x held at the control points to their values and free at
+// the border to vertices that are no unknowns: constants stay constants. Area and Laplacian make the solution one of the surface, not of how densely it is
+// meshed; tension keeps it from overshooting where nothing holds it (mouth, nostrils, neck).
 class SkinEquations {
  public:
   // `unknown`: #V, index of each vertex that is an unknown, -1 for others. `data_weight`: per unknown. Factors once.

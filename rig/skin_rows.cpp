@@ -92,13 +92,15 @@ struct SkinInterpolation::State {
   SparseRows blended;                     // step 1, per unknown; empty where there is no ray
   std::unique_ptr<SkinEquations> equations;
 
-  // Distance along the skin from the side opposite to each, per vertex; empty where nothing is there.
-  std::array<std::vector<float>, 7> toOppositeSide() const;
-  double pointDistance(std::uint32_t v, std::size_t p) const;
+  std::vector<double> fade;               // step 4, per unknown
+
+  void makeFade();
+  // How much of the columns of each side's points is left, per vertex; empty where the face has no such side.
+  std::array<std::vector<float>, 7> shareOfSide() const;
 };
 
 SkinInterpolation::SkinInterpolation(const SkinProblem& problem, const MaskOnSkin& mask)
-    : state_(new State{problem, mask, {}, {}, {}, nullptr}) {
+    : state_(new State{problem, mask, {}, {}, {}, nullptr, {}}) {
   State& s = *state_;
   const auto vertices = static_cast<std::uint32_t>(problem.mesh.vertexCount());
   s.unknown.assign(vertices, -1);
@@ -138,11 +140,25 @@ SkinInterpolation::SkinInterpolation(const SkinProblem& problem, const MaskOnSki
     s.blended.weight.insert(s.blended.weight.end(), chunk.weight.begin(), chunk.weight.end());
     chunk = {};
   }
+  s.makeFade();
   s.equations =
       std::make_unique<SkinEquations>(problem.skin, s.unknown, data_weight, mask.points, problem.eye_separation);
 }
 
 SkinInterpolation::~SkinInterpolation() = default;
+
+// 1 on the mask, 0 where the skin stays, in between by how near each is; flat at both ends.
+void SkinInterpolation::State::makeFade() {
+  std::vector<GeodesicSource> still;
+  for (std::uint32_t v = 0; v < unknown.size(); ++v)
+    if (problem.skin.stands(v) && unknown[v] < 0) still.push_back({v, 0.0F});
+  const std::vector<float> to_still = surfaceDistances(problem.skin.graph, still).distance;
+  fade.reserve(vertex.size());
+  for (const std::uint32_t v : vertex) {
+    const double beyond = problem.association.beyond[v], left = to_still[v];
+    fade.push_back(left < kUnreached ? std::pow(smoothStep(left / (left + beyond + 1e-12)), 2) : 1.0);
+  }
+}
 
 Columns SkinInterpolation::displace(const Columns& points) const {
   const State& s = *state_;
@@ -158,7 +174,7 @@ Columns SkinInterpolation::displace(const Columns& points) const {
         x.row(static_cast<Eigen::Index>(i)) += s.blended.weight[e] * values.row(s.blended.point[e]);
     s.equations->solve(values, x);
     for (std::size_t i = 0; i < s.vertex.size(); ++i)
-      out.block(s.vertex[i], first, 1, width) = x.row(static_cast<Eigen::Index>(i));
+      out.block(s.vertex[i], first, 1, width) = s.fade[i] * x.row(static_cast<Eigen::Index>(i));
     for (std::size_t p = 0; p < s.mask.points.size(); ++p)
       if (s.mask.points[p].isVertex())
         out.block(s.mask.points[p].around.front().vertex, first, 1, width) = values.row(static_cast<Eigen::Index>(p));
@@ -169,35 +185,43 @@ Columns SkinInterpolation::displace(const Columns& points) const {
   return out;
 }
 
-std::array<std::vector<float>, 7> SkinInterpolation::State::toOppositeSide() const {
-  std::array<std::vector<float>, 7> out;
+// All of it from where both sides are equally near along the skin, nothing on the opposite side. Distances are from
+// the skin that the mask itself covers: what only lies near to it (the inside of the mouth) has no side of its own, or
+// its two halves would part at a line that depends on how the mesh is cut.
+std::array<std::vector<float>, 7> SkinInterpolation::State::shareOfSide() const {
+  std::array<std::vector<float>, 7> to;
   parallelFor(6, [&](std::size_t k) {
     const auto side = static_cast<SlitSide>(k + 1);
-    std::vector<GeodesicSource> others;
+    std::vector<GeodesicSource> sources;
     for (std::uint32_t v = 0; v < problem.skin.same_as.size(); ++v)
-      if (problem.skin.stands(v) && opposite(problem.association.side[v], side)) others.push_back({v, 0.0F});
-    if (!others.empty()) out[k + 1] = geodesicDistances(problem.skin.graph, others).distance;
+      if (problem.skin.stands(v) && problem.association.on_mask[v] && problem.association.side[v] == side)
+        sources.push_back({v, 0.0F});
+    for (std::size_t p = 0; p < kFeaturePointCount; ++p)
+      if (slitSide(p) == side)
+        sources.insert(sources.end(), problem.feature_points[p].around.begin(), problem.feature_points[p].around.end());
+    to[k + 1] = surfaceDistances(problem.skin.graph, sources).distance;
   });
+  std::array<std::vector<float>, 7> out;
+  for (std::size_t own = 1; own < 7; ++own)
+    for (std::size_t other = 1; other < 7; ++other) {
+      if (!opposite(static_cast<SlitSide>(own), static_cast<SlitSide>(other))) continue;
+      out[own].assign(to[own].size(), 1.0F);
+      for (std::size_t v = 0; v < to[own].size(); ++v)
+        if (const double a = to[own][v], b = to[other][v]; b < kUnreached)
+          out[own][v] = a < kUnreached ? static_cast<float>(smoothStep(2 * b / (a + b + 1e-12))) : 0.0F;
+    }
   return out;
-}
-
-// Along the skin for the feature points; through the air for those that were added, which lie between them.
-double SkinInterpolation::State::pointDistance(std::uint32_t v, std::size_t p) const {
-  if (p >= kFeaturePointCount)
-    return (problem.mesh.positions.row(v) - mask.geometry.points.row(static_cast<Eigen::Index>(p))).norm();
-  return std::min(problem.association.point_distance(v, static_cast<Eigen::Index>(p)), 2 * problem.association.reach);
 }
 
 SkinRows SkinInterpolation::rows() const {
   const State& s = *state_;
   const std::size_t unknowns = s.vertex.size(), points = s.mask.geometry.pointCount();
-  const std::array<std::vector<float>, 7> to_opposite = s.toOppositeSide();
+  const std::array<std::vector<float>, 7> share_of_side = s.shareOfSide();
 
   struct Panel {
     std::vector<std::size_t> start{0};
     std::vector<std::uint16_t> point;
     std::vector<float> weight;
-    std::vector<double> sum;  // of each row before step 3
   };
   std::vector<Panel> panels((points + kPanel - 1) / static_cast<std::size_t>(kPanel));
   parallelFor(panels.size(), [&](std::size_t k) {
@@ -215,19 +239,12 @@ SkinRows SkinInterpolation::rows() const {
     s.equations->solve(values, x);
 
     Panel& out = panels[k];
-    out.sum.reserve(unknowns);
     for (std::size_t i = 0; i < unknowns; ++i) {
-      out.sum.push_back(x.row(static_cast<Eigen::Index>(i)).sum());
       for (std::size_t p = first; p < last; ++p) {
         double w = x(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(p - first));
         if (!(std::abs(w) > kNegligible)) continue;
-        // Step 3: a column of one side is led to zero towards the vertices of the opposite side, from the full weight
-        // where the column's own point is as near as the opposite side, to nothing there.
-        const auto& others = to_opposite[static_cast<std::size_t>(s.mask.geometry.point_side[p])];
-        if (!others.empty() && others[s.vertex[i]] < kUnreached) {
-          const double other = others[s.vertex[i]];
-          w *= smoothStep(2 * other / (other + s.pointDistance(s.vertex[i], p) + 1e-12));
-        }
+        if (const auto& share = share_of_side[static_cast<std::size_t>(s.mask.geometry.point_side[p])]; !share.empty())
+          w *= static_cast<double>(share[s.vertex[i]]);  // step 3
         if (!(std::abs(w) > kNegligible)) continue;
         out.point.push_back(static_cast<std::uint16_t>(p));
         out.weight.push_back(static_cast<float>(w));
@@ -258,13 +275,14 @@ SkinRows SkinInterpolation::rows() const {
       const auto& of = sharing[static_cast<std::size_t>(held_by[v])];
       for (const std::uint16_t p : of) row.add(p, 1.0 / static_cast<double>(of.size()));
     } else {
-      double before = 0;
-      for (const Panel& panel : panels) {
-        before += panel.sum[i];
+      for (const Panel& panel : panels)
         for (std::size_t e = panel.start[i]; e < panel.start[i + 1]; ++e) row.add(panel.point[e], panel.weight[e]);
-      }
-      if (const double after = row.sum(); after > 0 && before > 0) row.scale(std::min(before / after, 3.0));
+      if (const double sum = row.sum(); sum > 0) row.scale(s.fade[i] * std::min(1 / sum, 3.0));
       row.dropSmall();
+      if (!row.moves()) {  // so far out that nothing is left
+        row.clear();
+        continue;
+      }
     }
     out.set(v, row);
   }

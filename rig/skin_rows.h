@@ -49,20 +49,21 @@ struct SkinRows {
 //    change continuously from triangle to triangle and only RBFs that hold a point have a say at that point.
 // 2. The rows x of all vertices minimise the squared Laplacian of x over the skin, plus the squared distance to the
 //    rows of step 1, with the mask's points held exactly and vertices beyond the fade at zero. What has no ray
-//    (nostrils, the inside of the lips, the skin around the mask) so continues its surroundings smoothly. The Laplacian
-//    knows constants, so rows still sum to 1. blend_width: over what part of a mask triangle's size the second term
-//    gives way to the first.
-// 3. Lips and lids: what the opposite side would contribute is taken out, gradually from that side's own points to
-//    here.
+//    (nostrils, the inside of the lips, the skin around the mask) so continues its surroundings smoothly, under tension
+//    (skin_equations.h). The Laplacian knows constants, so rows still sum to 1. blend_width: over what part of a mask
+//    triangle's size the second term gives way to the first.
+// 3. Lips and lids: what the opposite side would contribute is taken out, gradually from where both sides are equally
+//    near along the skin to the opposite side itself.
+// 4. Beyond the mask's outline all fades, by distance along the skin, to nothing where the skin stays.
 class SkinInterpolation {
  public:
   // Does step 1 and factors the equations of step 2.
   SkinInterpolation(const SkinProblem& problem, const MaskOnSkin& mask);
   ~SkinInterpolation();
 
-  // Steps 2 and 3 for every point of the mask: the operator's rows.
+  // Steps 2 to 4 for every point of the mask: the operator's rows.
   SkinRows rows() const;
-  // Steps 1 and 2 for given displacements of the points (#M by C): #V by C, zero for what does not move.
+  // Steps 1, 2 and 4 for given displacements of the points (#M by C): #V by C, zero for what does not move.
   Columns displace(const Columns& points) const;
 
  private:

@@ -6,6 +6,7 @@
 #include <random>
 #include <set>
 #include <stdexcept>
+#include <tuple>
 
 #include <Eigen/Geometry>
 
@@ -62,14 +63,36 @@ Remeshed decimated(const Mesh& mesh, double share, const std::vector<std::uint32
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> uses;
   for (const Triangle& t : triangles)
     for (std::size_t i = 0; i < 3; ++i) ++uses[std::minmax(t[i], t[(i + 1) % 3])];
-  std::set<std::tuple<double, std::uint32_t, std::uint32_t>> queue;  // length, goes, stays
-  const auto length = [&](std::uint32_t a, std::uint32_t b) {
-    return (mesh.positions.row(a) - mesh.positions.row(b)).norm();
+  // Garland and Heckbert: the squared distance to the planes of all triangles that have gone into a vertex, by area; and
+  // a trace of length, so that on a flat place the short edges go first.
+  std::vector<Eigen::Matrix4d> quadric(vertices, Eigen::Matrix4d::Zero());
+  for (const Triangle& t : triangles) {
+    const Eigen::Vector3d a = mesh.positions.row(t[0]), b = mesh.positions.row(t[1]), c = mesh.positions.row(t[2]);
+    const Eigen::Vector3d cross = (b - a).cross(c - a);
+    if (!(cross.norm() > 0)) continue;
+    Eigen::Vector4d plane;
+    plane << cross.normalized(), -cross.normalized().dot(a);
+    for (const std::uint32_t v : t) quadric[v] += 0.5 * cross.norm() * plane * plane.transpose();
+  }
+  struct Collapse {
+    double cost;
+    std::uint32_t goes, stays, stamp;  // stamp: collapses into either when this was reckoned
+    bool operator<(const Collapse& o) const {
+      return std::tie(cost, goes, stays, stamp) < std::tie(o.cost, o.goes, o.stays, o.stamp);
+    }
   };
+  std::set<Collapse> queue;
+  std::vector<std::uint32_t> stamp(vertices, 0);
   for (const auto& [edge, count] : uses)
     if (count != 2) fixed[edge.first] = fixed[edge.second] = true;
   const auto offer = [&](std::uint32_t goes, std::uint32_t stays) {
-    if (!fixed[goes]) queue.emplace(length(goes, stays), goes, stays);
+    if (fixed[goes]) return;
+    const Eigen::Matrix4d q = quadric[goes] + quadric[stays];
+    Eigen::Vector4d at;
+    at << mesh.positions.row(stays).transpose(), 1;
+    const double area = q.topLeftCorner<3, 3>().trace();
+    const double length2 = (mesh.positions.row(goes) - mesh.positions.row(stays)).squaredNorm();
+    queue.insert({at.dot(q * at) + 1e-4 * area * length2, goes, stays, stamp[goes] + stamp[stays]});
   };
   for (const auto& [edge, count] : uses) {
     offer(edge.first, edge.second);
@@ -78,9 +101,9 @@ Remeshed decimated(const Mesh& mesh, double share, const std::vector<std::uint32
   std::size_t left = vertices;
   const auto wanted = static_cast<std::size_t>(share * static_cast<double>(vertices));
   while (left > wanted && !queue.empty()) {
-    const auto [l, goes, stays] = *queue.begin();
+    const auto [cost, goes, stays, when] = *queue.begin();
     queue.erase(queue.begin());
-    if (around[goes].empty()) continue;
+    if (around[goes].empty() || around[stays].empty() || when != stamp[goes] + stamp[stays]) continue;
     std::set<std::uint32_t> of_goes, of_stays;
     std::vector<std::uint32_t> shared;
     for (const std::uint32_t t : around[goes]) {
@@ -114,6 +137,8 @@ Remeshed decimated(const Mesh& mesh, double share, const std::vector<std::uint32
       around[stays].insert(t);
     }
     around[goes].clear();
+    quadric[stays] += quadric[goes];
+    ++stamp[stays];
     --left;
     for (const std::uint32_t t : around[stays])
       for (const std::uint32_t v : triangles[t])

@@ -15,8 +15,9 @@ struct Remeshed {
 
 // Every triangle in four, at the middles of its edges.
 Remeshed subdivided(const rig::Mesh& mesh);
-// Edges collapsed, the shortest first, until `share` of the vertices is left or nothing can go; vertices of `keep`, of
-// open edges and where a triangle would turn over stay. No vertex moves.
+// Edges collapsed, those first whose loss changes the surface least (Garland, Heckbert: Surface Simplification Using
+// Quadric Error Metrics), until `share` of the vertices is left or nothing can go; vertices of `keep`, of open edges and
+// where a triangle would turn over stay. No vertex moves.
 Remeshed decimated(const rig::Mesh& mesh, double share, const std::vector<std::uint32_t>& keep);
 // Vertices and polygons in another order, the same for the same seed.
 Remeshed shuffled(const rig::Mesh& mesh, std::uint32_t seed);
