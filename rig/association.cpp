@@ -183,9 +183,17 @@ SkinAssociation associateSkin(const Mesh& mesh, const Skin& skin, const std::vec
   Associator associator(mesh, skin, mask, eye_separation, out);
   std::vector<GeodesicSource> covered;
   std::vector<std::uint32_t> left;
+  constexpr std::size_t kChunk = 512;
+  std::vector<std::uint8_t> met(vertices, 0);
+  parallelFor((vertices + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+    for (std::size_t v = chunk * kChunk; v < std::min((chunk + 1) * kChunk, vertices); ++v) {
+      const auto u = static_cast<std::uint32_t>(v);
+      if (skin.stands(u) && is_skin[skin.component[u]]) met[v] = associator.byRay(u) || associator.byNearness(u) ? 1 : 0;
+    }
+  });
   for (std::uint32_t v = 0; v < vertices; ++v) {
     if (!skin.stands(v) || !is_skin[skin.component[v]]) continue;
-    out.on_mask[v] = associator.byRay(v) || associator.byNearness(v);
+    out.on_mask[v] = met[v] != 0;
     if (out.on_mask[v])
       covered.push_back({v, 0.0F});
     else

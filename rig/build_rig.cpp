@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include <Eigen/Geometry>
@@ -133,8 +134,7 @@ std::vector<Slit> slits(const FeaturePointPositions& points) {
 std::vector<bool> skinComponents(const Mesh& mesh, const Skin& skin, const Rig& rig) {
   std::vector<std::size_t> votes(*std::max_element(skin.component.begin(), skin.component.end()) + std::size_t{1}, 0);
   std::vector<bool> is_skin(votes.size(), false);
-  const ClosestPoint surface(mesh.positions, skin.triangles);
-  bool free_positions = false;
+  std::optional<ClosestPoint> surface;  // only where a position asks for it
   for (std::size_t p = 0; p < kFeaturePointCount; ++p) {
     if (rig.feature_vertex[p] >= 0) {
       const std::uint32_t c = skin.component[static_cast<std::size_t>(rig.feature_vertex[p])];
@@ -142,11 +142,11 @@ std::vector<bool> skinComponents(const Mesh& mesh, const Skin& skin, const Rig& 
       ++votes[c];
       continue;
     }
-    free_positions = true;
-    const SurfacePoint nearest = surface.find(rig.feature_positions.row(static_cast<Eigen::Index>(p)).transpose());
-    if (nearest.triangle >= 0) ++votes[skin.component[surface.triangle(nearest.triangle)[0]]];
+    if (!surface) surface.emplace(mesh.positions, skin.triangles);
+    const SurfacePoint nearest = surface->find(rig.feature_positions.row(static_cast<Eigen::Index>(p)).transpose());
+    if (nearest.triangle >= 0) ++votes[skin.component[surface->triangle(nearest.triangle)[0]]];
   }
-  if (free_positions)
+  if (surface)
     is_skin[static_cast<std::size_t>(std::max_element(votes.begin(), votes.end()) - votes.begin())] = true;
   return is_skin;
 }
@@ -156,7 +156,7 @@ SkinPoints pointsOnSkin(const Mesh& mesh, const Skin& skin, const std::vector<bo
   for (const auto& t : skin.triangles)
     if (is_skin[skin.component[t[0]]]) triangles.push_back(t);
   if (triangles.empty()) throw InputError("the feature points are on no face of the mesh");
-  const ClosestPoint surface(mesh.positions, std::move(triangles));
+  std::optional<ClosestPoint> surface;  // only where a position asks for it
   SkinPoints out(kFeaturePointCount);
   for (std::size_t p = 0; p < kFeaturePointCount; ++p) {
     if (rig.feature_vertex[p] >= 0) {
@@ -164,8 +164,9 @@ SkinPoints pointsOnSkin(const Mesh& mesh, const Skin& skin, const std::vector<bo
       continue;
     }
     const Eigen::Vector3d at = rig.feature_positions.row(static_cast<Eigen::Index>(p));
-    const SurfacePoint nearest = surface.find(at);
-    const auto& corners = surface.triangle(nearest.triangle);
+    if (!surface) surface.emplace(mesh.positions, std::move(triangles));
+    const SurfacePoint nearest = surface->find(at);
+    const auto& corners = surface->triangle(nearest.triangle);
     for (std::size_t i = 0; i < 3; ++i) {
       if (nearest.barycentric[i] > 1 - 1e-6) {
         out[p] = {{{corners[i], 0.0F}}, {1.0}};

@@ -1,13 +1,19 @@
 #include "rig/corrections.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <thread>
+#include <utility>
+#include <vector>
 
 #include <Eigen/Geometry>
 
+#include "rig/parallel.h"
 #include "rig/pose_lab.h"
 
 namespace volto::rig {
@@ -62,14 +68,34 @@ class CorrectionMaker {
 
   void make() {
     holdMouthCloseToJaw();
-    for (std::size_t k = 0; k < rig_.blendshapes.size(); ++k) shape(k);
-    for (const Pair& pair : kLidPairs) forSides(pair);
-    for (const Pair& pair : kFoldPairs) forSides(pair);
+    std::vector<SparseDisplacement> of_shape(rig_.blendshapes.size());
+    inParallel(of_shape.size(), [&](CorrectionMaker& maker, std::size_t k) { of_shape[k] = maker.shape(k); });
+    for (std::size_t k = 0; k < of_shape.size(); ++k) rig_.blendshapes[k].correction = std::move(of_shape[k]);
+
+    std::vector<std::pair<std::string, std::string>> pairs;
+    for (const Pair& pair : kLidPairs) addSides(pair, pairs);
+    for (const Pair& pair : kFoldPairs) addSides(pair, pairs);
     for (const std::string_view name : kWithOpenJaw)
-      for (const char* side : {"Left", "Right"}) combine(std::string(name) + side, "jawOpen");
+      for (const char* side : {"Left", "Right"}) pairs.emplace_back(std::string(name) + side, "jawOpen");
+    std::vector<Combination> combined(pairs.size());
+    inParallel(pairs.size(), [&](CorrectionMaker& maker, std::size_t i) {
+      combined[i] = maker.combine(pairs[i].first, pairs[i].second);
+    });
+    for (Combination& combination : combined)
+      if (!combination.correction.empty()) rig_.combinations.push_back(std::move(combination));
   }
 
  private:
+  // Each thread with a lab of its own; the rig stays as it is meanwhile.
+  void inParallel(std::size_t count, const std::function<void(CorrectionMaker&, std::size_t)>& work) {
+    std::atomic<std::size_t> next{0};
+    parallelFor(std::clamp(std::thread::hardware_concurrency(), 1U, 8U), [&](std::size_t worker) {
+      std::optional<CorrectionMaker> own;
+      if (worker != 0) own.emplace(rig_, skin_);
+      for (std::size_t i = next++; i < count; i = next++) work(own ? *own : *this, i);
+    });
+  }
+
   std::optional<std::size_t> indexOf(std::string_view name) const {
     for (std::size_t k = 0; k < rig_.blendshapes.size(); ++k)
       if (rig_.blendshapes[k].name == name) return k;
@@ -109,7 +135,7 @@ class CorrectionMaker {
     rig_.combinations.push_back(std::move(combination));
   }
 
-  void shape(std::size_t k) {
+  SparseDisplacement shape(std::size_t k) {
     const std::string& name = rig_.blendshapes[k].name;
     lab_.setWeights(weightsOf({k}));
     DenseDisplacement extra = lab_.nothing();
@@ -125,7 +151,7 @@ class CorrectionMaker {
     } else {
       lab_.unfold(extra);
     }
-    rig_.blendshapes[k].correction = lab_.sparse(extra);
+    return lab_.sparse(extra);
   }
 
   // Funnel and pucker both bring the lips forward. Together they do not bring them twice as far.
@@ -168,18 +194,23 @@ class CorrectionMaker {
     }
   }
 
-  void forSides(const Pair& pair) {
-    if (!pair.sided) return combine(std::string(pair.first), std::string(pair.second));
+  void addSides(const Pair& pair, std::vector<std::pair<std::string, std::string>>& out) const {
+    if (!pair.sided) {
+      out.emplace_back(pair.first, pair.second);
+      return;
+    }
     for (const std::string side : {"Left", "Right"}) {
       std::string first = std::string(pair.first) + side;
       if (!indexOf(first)) first = pair.first;  // browInnerUp
-      combine(first, std::string(pair.second) + side);
+      out.emplace_back(first, std::string(pair.second) + side);
     }
   }
 
-  void combine(const std::string& first, const std::string& second) {
+  // Without correction where none is needed, or where the rig has no such shapes.
+  Combination combine(const std::string& first, const std::string& second) {
+    Combination combination;
     const auto a = indexOf(first), b = indexOf(second);
-    if (!a || !b) return;
+    if (!a || !b) return combination;
     DenseDisplacement extra = lab_.nothing();
     if (first == "mouthFunnel" && second == "mouthPucker") shareProtrusion(*b, extra);
     if (first == "mouthClose" && second == "jawOpen") keepJawInChin(*a, *b, extra);
@@ -193,11 +224,10 @@ class CorrectionMaker {
     } else {
       lab_.unfold(extra);
     }
-    Combination combination;
     combination.name = first + " + " + second;
     combination.drivers = {{static_cast<std::uint16_t>(*a), false}, {static_cast<std::uint16_t>(*b), false}};
     combination.correction = lab_.sparse(extra);
-    if (!combination.correction.empty()) rig_.combinations.push_back(std::move(combination));
+    return combination;
   }
 
   // --- lids

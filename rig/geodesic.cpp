@@ -1,6 +1,7 @@
 #include "rig/geodesic.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <queue>
 #include <tuple>
@@ -49,27 +50,26 @@ GeodesicDistances geodesicDistances(const EdgeGraph& graph, std::span<const Geod
   GeodesicDistances out;
   out.distance.assign(graph.vertexCount(), kUnreached);
   out.nearest_source.assign(graph.vertexCount(), -1);
-  using Entry = std::tuple<float, std::int32_t, std::uint32_t>;  // distance, source, vertex
-  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
-  for (std::size_t s = 0; s < sources.size(); ++s)
-    if (sources[s].distance <= limit)
-      queue.emplace(sources[s].distance, static_cast<std::int32_t>(s), sources[s].vertex);
-  while (!queue.empty()) {
-    const auto [distance, source, v] = queue.top();
-    queue.pop();
-    if (out.nearest_source[v] >= 0) continue;
+  // Distances are not negative, so their bits are in their order: one comparison for distance and vertex.
+  std::priority_queue<std::uint64_t, std::vector<std::uint64_t>, std::greater<>> queue;
+  const auto offer = [&](float distance, std::int32_t source, std::uint32_t v) {
+    if (!(distance <= limit) || distance > out.distance[v]) return;
+    if (distance == out.distance[v] && source >= out.nearest_source[v]) return;
     out.distance[v] = distance;
     out.nearest_source[v] = source;
-    for (std::uint32_t e = graph.start[v]; e < graph.start[v + 1]; ++e) {
-      const float next = distance + graph.length[e];
-      const std::uint32_t u = graph.neighbour[e];
-      if (next <= limit && next < out.distance[u] && out.nearest_source[u] < 0) {
-        out.distance[u] = next;
-        queue.emplace(next, source, u);
-      }
-    }
+    queue.push(std::uint64_t{std::bit_cast<std::uint32_t>(distance)} << 32 | v);
+  };
+  for (std::size_t s = 0; s < sources.size(); ++s)
+    offer(sources[s].distance, static_cast<std::int32_t>(s), sources[s].vertex);
+  while (!queue.empty()) {
+    const std::uint64_t entry = queue.top();
+    queue.pop();
+    const auto v = static_cast<std::uint32_t>(entry);
+    const auto distance = std::bit_cast<float>(static_cast<std::uint32_t>(entry >> 32));
+    if (distance > out.distance[v]) continue;
+    for (std::uint32_t e = graph.start[v]; e < graph.start[v + 1]; ++e)
+      offer(distance + graph.length[e], out.nearest_source[v], graph.neighbour[e]);
   }
-  // What was only looked at, not settled, cannot remain: everything within the limit gets settled.
   return out;
 }
 

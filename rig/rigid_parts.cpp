@@ -486,7 +486,8 @@ class PartPlacer {
       double total = 0, largest = 0;
       std::int16_t triangle = -1;
       for (std::size_t r = 0; r < roots.size(); ++r) {
-        share[r] = 1 / std::pow((roots[r].at - at_.row(v).transpose()).squaredNorm() + 1e-6, 2);
+        const double near = 1 / ((roots[r].at - at_.row(v).transpose()).squaredNorm() + 1e-6);
+        share[r] = near * near;
         total += share[r];
         if (share[r] > largest) {
           largest = share[r];
@@ -494,8 +495,10 @@ class PartPlacer {
         }
       }
       Binding binding{v, {}};
-      for (std::size_t r = 0; r < roots.size(); ++r)
+      for (std::size_t r = 0; r < roots.size(); ++r) {
+        if (share[r] < 1e-6 * total) continue;  // compact() would drop them, one by one
         for (const auto& [of, weight] : roots[r].of) binding.of.emplace_back(of, share[r] / total * weight);
+      }
       bind(compact(std::move(binding)), triangle);
     }
   }

@@ -94,13 +94,16 @@ struct SkinInterpolation::State {
 
   std::vector<double> fade;               // step 4, per unknown
 
+  std::array<std::vector<float>, 7> share_of_side;  // step 3, per vertex
+
+  void blend();
   void makeFade();
   // How much of the columns of each side's points is left, per vertex; empty where the face has no such side.
   std::array<std::vector<float>, 7> shareOfSide() const;
 };
 
 SkinInterpolation::SkinInterpolation(const SkinProblem& problem, const MaskOnSkin& mask)
-    : state_(new State{problem, mask, {}, {}, {}, nullptr, {}}) {
+    : state_(new State{problem, mask, {}, {}, {}, nullptr, {}, {}}) {
   State& s = *state_;
   const auto vertices = static_cast<std::uint32_t>(problem.mesh.vertexCount());
   s.unknown.assign(vertices, -1);
@@ -109,40 +112,53 @@ SkinInterpolation::SkinInterpolation(const SkinProblem& problem, const MaskOnSki
       s.unknown[v] = static_cast<std::int32_t>(s.vertex.size());
       s.vertex.push_back(v);
     }
-  const BlendedMultiquadrics multiquadrics(mask.geometry, problem.edits);
   const std::vector<double> edge_length = maskEdgeLength(mask.geometry);
   std::vector<double> data_weight(s.vertex.size(), 0.0);
+  for (std::size_t i = 0; i < s.vertex.size(); ++i) {
+    const std::int32_t triangle = mask.triangle[s.vertex[i]];
+    if (triangle < 0) continue;
+    double size = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      size += mask.barycentric[s.vertex[i]][k] * edge_length[mask.geometry.triangles[static_cast<std::size_t>(triangle)][k]];
+    const double width = std::max(problem.blend_width, 1e-3) * size / problem.eye_separation;
+    // The two terms balance at this wavelength: (2 pi / width)^4.
+    data_weight[i] = std::pow(2 * 3.14159265358979 / width, 4);
+  }
+  // The factorisation, which takes longest and is one thread's work, beside all that does not need it.
+  parallelFor(2, [&](std::size_t which) {
+    if (which == 0) {
+      s.equations =
+          std::make_unique<SkinEquations>(problem.skin, s.unknown, data_weight, mask.points, problem.eye_separation);
+    } else {
+      s.blend();
+      s.makeFade();
+      s.share_of_side = s.shareOfSide();
+    }
+  });
+}
 
-  // In chunks of vertices, put together in order.
+// Step 1, in chunks of vertices, put together in order.
+void SkinInterpolation::State::blend() {
+  const BlendedMultiquadrics multiquadrics(mask.geometry, problem.edits);
   constexpr std::size_t kChunk = 1024;
-  std::vector<SparseRows> chunks((s.vertex.size() + kChunk - 1) / kChunk);
+  std::vector<SparseRows> chunks((vertex.size() + kChunk - 1) / kChunk);
   parallelFor(chunks.size(), [&](std::size_t chunk) {
     RowBuilder row(mask.geometry.pointCount());
     Eigen::RowVectorXd weights;
-    for (std::size_t i = chunk * kChunk; i < std::min((chunk + 1) * kChunk, s.vertex.size()); ++i) {
-      const std::uint32_t v = s.vertex[i];
-      if (mask.triangle[v] >= 0) {
-        const auto triangle = static_cast<std::size_t>(mask.triangle[v]);
-        const auto& barycentric = mask.barycentric[v];
-        multiquadrics.addRow(triangle, barycentric, problem.mesh.positions.row(v).transpose(), row, weights);
-        double size = 0;
-        for (std::size_t k = 0; k < 3; ++k) size += barycentric[k] * edge_length[mask.geometry.triangles[triangle][k]];
-        const double width = std::max(problem.blend_width, 1e-3) * size / problem.eye_separation;
-        // The two terms balance at this wavelength: (2 pi / width)^4.
-        data_weight[i] = std::pow(2 * 3.14159265358979 / width, 4);
-      }
+    for (std::size_t i = chunk * kChunk; i < std::min((chunk + 1) * kChunk, vertex.size()); ++i) {
+      const std::uint32_t v = vertex[i];
+      if (mask.triangle[v] >= 0)
+        multiquadrics.addRow(static_cast<std::size_t>(mask.triangle[v]), mask.barycentric[v],
+                             problem.mesh.positions.row(v).transpose(), row, weights);
       row.finish(chunks[chunk]);
     }
   });
   for (SparseRows& chunk : chunks) {
-    for (std::size_t r = 0; r < chunk.size(); ++r) s.blended.start.push_back(s.blended.point.size() + chunk.start[r + 1]);
-    s.blended.point.insert(s.blended.point.end(), chunk.point.begin(), chunk.point.end());
-    s.blended.weight.insert(s.blended.weight.end(), chunk.weight.begin(), chunk.weight.end());
+    for (std::size_t r = 0; r < chunk.size(); ++r) blended.start.push_back(blended.point.size() + chunk.start[r + 1]);
+    blended.point.insert(blended.point.end(), chunk.point.begin(), chunk.point.end());
+    blended.weight.insert(blended.weight.end(), chunk.weight.begin(), chunk.weight.end());
     chunk = {};
   }
-  s.makeFade();
-  s.equations =
-      std::make_unique<SkinEquations>(problem.skin, s.unknown, data_weight, mask.points, problem.eye_separation);
 }
 
 SkinInterpolation::~SkinInterpolation() = default;
@@ -216,7 +232,6 @@ std::array<std::vector<float>, 7> SkinInterpolation::State::shareOfSide() const 
 SkinRows SkinInterpolation::rows() const {
   const State& s = *state_;
   const std::size_t unknowns = s.vertex.size(), points = s.mask.geometry.pointCount();
-  const std::array<std::vector<float>, 7> share_of_side = s.shareOfSide();
 
   struct Panel {
     std::vector<std::size_t> start{0};
@@ -243,7 +258,7 @@ SkinRows SkinInterpolation::rows() const {
       for (std::size_t p = first; p < last; ++p) {
         double w = x(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(p - first));
         if (!(std::abs(w) > kNegligible)) continue;
-        if (const auto& share = share_of_side[static_cast<std::size_t>(s.mask.geometry.point_side[p])]; !share.empty())
+        if (const auto& share = s.share_of_side[static_cast<std::size_t>(s.mask.geometry.point_side[p])]; !share.empty())
           w *= static_cast<double>(share[s.vertex[i]]);  // step 3
         if (!(std::abs(w) > kNegligible)) continue;
         out.point.push_back(static_cast<std::uint16_t>(p));
