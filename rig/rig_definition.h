@@ -8,7 +8,7 @@
 //   "labels": {"5.1": "left cheek"},                           region of a point: which lip or lid it counts with
 //   "regions": [
 //     {"triangle": ["2.4", "8.3", "8.5"],                      or a number 0 to 135, or "region": "chin" for all of it
-//      "add": [["8.7", "8.3", "2.8"]], "remove": [17],         triangles of its neighbourhood
+//      "add": [["8.7", "8.3", "2.4"]], "remove": [17],         triangles of its neighbourhood
 //      "stiffness": 1.5}                                       factor, 0.1 to 10
 //   ],
 //   "parts": [{"vertex": 8123, "follows": "jaw", "name": "lower denture"}],   head, jaw, left eye, right eye, skin
