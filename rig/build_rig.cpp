@@ -151,7 +151,11 @@ std::vector<bool> skinComponents(const Mesh& mesh, const Skin& skin, const Rig& 
   return is_skin;
 }
 
-SkinPoints pointsOnSkin(const Mesh& mesh, const Skin& skin, const std::vector<bool>& is_skin, const Rig& rig) {
+// Farther off the skin than this, a position is a mistake; nearer, it lies on a mask a little outside the mesh.
+constexpr double kFarthestOffSkinEs = 0.5;
+
+SkinPoints pointsOnSkin(const Mesh& mesh, const Skin& skin, const std::vector<bool>& is_skin, const Rig& rig,
+                        double eye_separation) {
   std::vector<std::array<std::uint32_t, 3>> triangles;
   for (const auto& t : skin.triangles)
     if (is_skin[skin.component[t[0]]]) triangles.push_back(t);
@@ -166,6 +170,9 @@ SkinPoints pointsOnSkin(const Mesh& mesh, const Skin& skin, const std::vector<bo
     const Eigen::Vector3d at = rig.feature_positions.row(static_cast<Eigen::Index>(p));
     if (!surface) surface.emplace(mesh.positions, std::move(triangles));
     const SurfacePoint nearest = surface->find(at);
+    if (nearest.distance > kFarthestOffSkinEs * eye_separation)
+      throw InputError("feature point " + idOf(p) + " lies more than half an eye separation off the surface (at " +
+                       std::to_string(nearest.distance) + "); move it onto the skin");
     const auto& corners = surface->triangle(nearest.triangle);
     for (std::size_t i = 0; i < 3; ++i) {
       if (nearest.barycentric[i] > 1 - 1e-6) {
@@ -310,7 +317,7 @@ Rig buildRig(const Mesh& neutral, const FeaturePointChoices& points, const RigOp
   const Mesh joined = t_vertices.empty() ? Mesh() : joinTVertices(neutral, same_as, t_vertices);
   Skin skin = prepareSkin(neutral, t_vertices.empty() ? neutral : joined, std::move(same_as));
   const std::vector<bool> is_skin = skinComponents(neutral, skin, rig);
-  const SkinPoints on_skin = pointsOnSkin(neutral, skin, is_skin, rig);
+  const SkinPoints on_skin = pointsOnSkin(neutral, skin, is_skin, rig, eye_separation);
   turnNormalsOutward(rig.feature_positions, on_skin, skin);
 
   const MaskGeometry mask = controlMaskGeometry(rig.feature_positions, options.edits);

@@ -293,7 +293,41 @@ std::vector<CorrespondingPlace> denseCorrespondence(const GenericHead& head, con
   return out;
 }
 
+FeaturePointPositions normalsAtPoints(const GenericHead& head,
+                                      const std::vector<std::array<std::uint32_t, 3>>& face_triangles) {
+  const VertexPositions normals = faceNormals(face_triangles, head.face.positions);
+  FeaturePointPositions out;
+  for (std::size_t p = 0; p < kFeaturePointCount; ++p)
+    out.row(static_cast<Eigen::Index>(p)) = placeOn(normals, head.points[p]).normalized().transpose();
+  return out;
+}
+
 }  // namespace
+
+CheckedPoints checkPoints(const Mesh& mesh, const FeaturePointChoices& given) {
+  constexpr double kFarOff_es = 0.5;  // and three times as far as is usual on this face
+  requireUsable(mesh, given, {});
+  const Target on_mesh(mesh, given, {});
+  const GenericHead& head = genericHead();
+  std::vector<PlacedLandmark> landmarks = on_mesh.landmarks();
+  FacePlacement placed = placeFace(landmarks, head.human.points, normalsAtPoints(head, triangulate(head.face)), on_mesh.insideOut());
+  CheckedPoints out{{}, std::move(placed.notes)};
+  for (const auto& [p, choice] : given)
+    out.points.emplace(placed.sides_exchanged ? featurePoints()[p].mirror : p, choice);
+  std::vector<double> off;
+  for (const PlacedLandmark& l : landmarks)
+    off.push_back((placed.mesh_from_generic.inverse(l.position) -
+                   head.human.points.row(static_cast<Eigen::Index>(l.feature_point)).transpose())
+                      .norm());
+  std::vector<double> sorted = off;
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
+  std::string doubtful;
+  for (std::size_t i = 0; i < off.size(); ++i)
+    if (off[i] > kFarOff_es && off[i] > 3 * sorted[sorted.size() / 2])
+      doubtful.append(1, ' ').append(featurePoints()[landmarks[i].feature_point].id);
+  if (!doubtful.empty()) out.notes.push_back("far from where the other points have it on a human face; check" + doubtful);
+  return out;
+}
 
 FittedPoints fitPoints(const Mesh& mesh, const FeaturePointChoices& given, std::span<const RoughPoint> rough,
                        const FitOptions& options) {
@@ -302,11 +336,8 @@ FittedPoints fitPoints(const Mesh& mesh, const FeaturePointChoices& given, std::
   const GenericHead& head = options.head != nullptr ? *options.head : genericHead();
   const HumanFace& human = head.human;
 
-  FeaturePointPositions generic_normals;
   const std::vector<std::array<std::uint32_t, 3>> face_triangles = triangulate(head.face);
-  const VertexPositions rest_normals = faceNormals(face_triangles, head.face.positions);
-  for (std::size_t p = 0; p < kFeaturePointCount; ++p)
-    generic_normals.row(static_cast<Eigen::Index>(p)) = placeOn(rest_normals, head.points[p]).normalized().transpose();
+  const FeaturePointPositions generic_normals = normalsAtPoints(head, face_triangles);
 
   FittedPoints out;
   std::vector<PlacedLandmark> landmarks = on_mesh.landmarks();

@@ -51,4 +51,13 @@ extern const std::array<std::string_view, 10> kTenPoints;
 FittedPoints fitPoints(const Mesh& mesh, const FeaturePointChoices& given, std::span<const RoughPoint> rough = {},
                        const FitOptions& options = {});
 
+// All 84 given: nothing is fitted, but the same is refused (far off the surface, left and right exchanged), points of a
+// mirror image are renamed, and a point that is far from where the others of a human face would have it is named in a
+// note.
+struct CheckedPoints {
+  FeaturePointChoices points;
+  std::vector<std::string> notes;
+};
+CheckedPoints checkPoints(const Mesh& mesh, const FeaturePointChoices& given);
+
 }  // namespace volto::rig

@@ -43,16 +43,23 @@ double agreement(const std::vector<PlacedLandmark>& landmarks, const FeaturePoin
   return sum / static_cast<double>(landmarks.size());
 }
 
-// A left point whose partner is given too and that fit better the other way round.
+// A left point whose partner is given too and that fit better the other way round: all landmarks together where they are
+// few, the two by themselves where one pair among many hardly shows.
 void requirePairsRightWayRound(std::vector<PlacedLandmark> landmarks, const FeaturePointPositions& generic,
-                               double rms) {
+                               const SimilarityFit& fit) {
+  const auto off2 = [&](std::size_t i, std::size_t as) {
+    const Eigen::Vector3d wanted = generic.row(static_cast<Eigen::Index>(landmarks[as].feature_point));
+    return (fit.similarity.inverse(landmarks[i].position) - wanted).squaredNorm();
+  };
   std::string exchanged;
   for (std::size_t i = 0; i < landmarks.size(); ++i)
     for (std::size_t j = i + 1; j < landmarks.size(); ++j) {
       if (featurePoints()[landmarks[i].feature_point].mirror != landmarks[j].feature_point) continue;
+      const double as_named = off2(i, i) + off2(j, j);
+      const bool surely = as_named > 0.2 && off2(i, j) + off2(j, i) < 0.15 * as_named;
       std::swap(landmarks[i].feature_point, landmarks[j].feature_point);
       const double other_way = fitSimilarity(pairsOf(landmarks, generic)).rms;
-      if (rms > 0.15 && other_way < 0.6 * rms && exchanged.empty())
+      if ((surely || (fit.rms > 0.15 && other_way < 0.6 * fit.rms)) && exchanged.empty())
         exchanged = nameOf(landmarks[j].feature_point) + " and " + nameOf(landmarks[i].feature_point);
       std::swap(landmarks[i].feature_point, landmarks[j].feature_point);
     }
@@ -106,7 +113,7 @@ FacePlacement placeFace(std::vector<PlacedLandmark>& landmarks, const FeaturePoi
           "the mesh is a mirror image (left-handed): points of the left and the right are exchanged");
     }
   }
-  requirePairsRightWayRound(landmarks, generic, fit.rms);
+  requirePairsRightWayRound(landmarks, generic, fit);
   if (inside_out && !out.sides_exchanged) out.notes.emplace_back("the mesh is inside out: its normals were turned");
   out.mesh_from_generic = fit.similarity;
   return out;

@@ -218,5 +218,44 @@ TEST_F(FitPoints, VertexOutOfRangeIsRefused) {
   EXPECT_NE(refusal(adult_->mesh, told).find("9.3 is vertex 4000000"), std::string::npos);
 }
 
+// --- all 84 given
+
+std::string checkRefusal(const Mesh& mesh, const FeaturePointChoices& given) {
+  try {
+    checkPoints(mesh, given);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST_F(FitPoints, AllPointsOfTheShippedHeadsPassTheCheck) {
+  for (const KnownHead* head : {adult_, creature_}) {
+    const CheckedPoints checked = checkPoints(head->placedAnyhow(3).mesh, head->truth);
+    EXPECT_EQ(checked.points, head->truth);
+    EXPECT_TRUE(checked.notes.empty()) << checked.notes.front();
+  }
+}
+
+TEST_F(FitPoints, AllPointsExchangedOrOnePairOfThemIsNoticedAndNamed) {
+  FeaturePointChoices all, one = adult_->truth;
+  for (const auto& [p, choice] : adult_->truth) all[featurePoints()[p].mirror] = choice;
+  std::swap(one.at(featurePointIndex("8.3").value()), one.at(featurePointIndex("8.4").value()));
+  EXPECT_NE(checkRefusal(adult_->mesh, all).find("left and right are exchanged"), std::string::npos);
+  const std::string message = checkRefusal(adult_->mesh, one);
+  EXPECT_NE(message.find("8.3"), std::string::npos) << message;
+  EXPECT_NE(message.find("only when exchanged"), std::string::npos) << message;
+}
+
+TEST_F(FitPoints, APointFarFromItsPlaceAmongAllIsNamed) {
+  FeaturePointChoices given = adult_->truth;
+  given[featurePointIndex("9.3").value()] = given.at(featurePointIndex("10.7").value());  // the nose on the ear lobe
+  const CheckedPoints checked = checkPoints(adult_->mesh, given);
+  ASSERT_EQ(checked.notes.size(), 1U);
+  EXPECT_NE(checked.notes[0].find("check 9.3"), std::string::npos) << checked.notes[0];
+  given[featurePointIndex("9.3").value()] = Eigen::Vector3d(adult_->at("9.3") + Eigen::Vector3d(0, 0, 400));
+  EXPECT_NE(checkRefusal(adult_->mesh, given).find("9.3 (tip of the nose) lies"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace volto::rig

@@ -36,8 +36,11 @@ std::string summary(const rig::FittedPoints& fitted, std::size_t given, bool fou
 }  // namespace
 
 CompletePoints completePoints(const rig::Mesh& mesh, const rig::FeaturePointChoices& given) {
-  if (given.size() == kFeaturePointCount) return {given, {}};
   CompletePoints out;
+  if (given.size() == kFeaturePointCount) {
+    rig::CheckedPoints checked = rig::checkPoints(mesh, given);
+    return {std::move(checked.points), std::move(checked.notes)};
+  }
   const bool find = given.size() < rig::kFewestPoints;
   rig::FittedPoints fitted;
   if (find) {

@@ -13,7 +13,7 @@ struct CompletePoints {
   std::vector<std::string> notes;   // one line each: how sure, what to check, what was mended
 };
 
-// 84 given: those. At least rig::kFewestPoints: the rest by fitting the generic head to them. Fewer, or none: the face
+// 84 given: those, checked. At least rig::kFewestPoints: the rest by fitting the generic head to them. Fewer, or none: the face
 // is looked for first. Throws rig::InputError.
 CompletePoints completePoints(const rig::Mesh& mesh, const rig::FeaturePointChoices& given);
 
