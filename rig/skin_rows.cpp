@@ -94,12 +94,13 @@ struct SkinInterpolation::State {
 
   std::vector<double> fade;               // step 4, per unknown
 
-  std::array<std::vector<float>, 7> share_of_side;  // step 3, per vertex
+  std::array<std::vector<float>, 7> to_opposite;  // step 3, per vertex
 
   void blend();
   void makeFade();
-  // How much of the columns of each side's points is left, per vertex; empty where the face has no such side.
-  std::array<std::vector<float>, 7> shareOfSide() const;
+  // Distance along the skin from the side opposite to each, per vertex; empty where nothing is there.
+  std::array<std::vector<float>, 7> toOppositeSide() const;
+  double pointDistance(std::uint32_t v, std::size_t p) const;
 };
 
 SkinInterpolation::SkinInterpolation(const SkinProblem& problem, const MaskOnSkin& mask)
@@ -132,7 +133,7 @@ SkinInterpolation::SkinInterpolation(const SkinProblem& problem, const MaskOnSki
     } else {
       s.blend();
       s.makeFade();
-      s.share_of_side = s.shareOfSide();
+      s.to_opposite = s.toOppositeSide();
     }
   });
 }
@@ -201,32 +202,29 @@ Columns SkinInterpolation::displace(const Columns& points) const {
   return out;
 }
 
-// All of it from where both sides are equally near along the skin, nothing on the opposite side. Distances are from
-// the skin that the mask itself covers: what only lies near to it (the inside of the mouth) has no side of its own, or
-// its two halves would part at a line that depends on how the mesh is cut.
-std::array<std::vector<float>, 7> SkinInterpolation::State::shareOfSide() const {
-  std::array<std::vector<float>, 7> to;
+// From the skin that the mask itself covers: what only lies near to it (the inside of the mouth) has no side of its own,
+// or its two halves would part at a line that depends on how the mesh is cut.
+std::array<std::vector<float>, 7> SkinInterpolation::State::toOppositeSide() const {
+  std::array<std::vector<float>, 7> out;
   parallelFor(6, [&](std::size_t k) {
     const auto side = static_cast<SlitSide>(k + 1);
-    std::vector<GeodesicSource> sources;
+    std::vector<GeodesicSource> others;
     for (std::uint32_t v = 0; v < problem.skin.same_as.size(); ++v)
-      if (problem.skin.stands(v) && problem.association.on_mask[v] && problem.association.side[v] == side)
-        sources.push_back({v, 0.0F});
+      if (problem.skin.stands(v) && problem.association.on_mask[v] && opposite(problem.association.side[v], side))
+        others.push_back({v, 0.0F});
     for (std::size_t p = 0; p < kFeaturePointCount; ++p)
-      if (slitSide(p) == side)
-        sources.insert(sources.end(), problem.feature_points[p].around.begin(), problem.feature_points[p].around.end());
-    to[k + 1] = surfaceDistances(problem.skin.graph, sources).distance;
+      if (opposite(slitSide(p), side))
+        others.insert(others.end(), problem.feature_points[p].around.begin(), problem.feature_points[p].around.end());
+    if (!others.empty()) out[k + 1] = surfaceDistances(problem.skin.graph, others).distance;
   });
-  std::array<std::vector<float>, 7> out;
-  for (std::size_t own = 1; own < 7; ++own)
-    for (std::size_t other = 1; other < 7; ++other) {
-      if (!opposite(static_cast<SlitSide>(own), static_cast<SlitSide>(other))) continue;
-      out[own].assign(to[own].size(), 1.0F);
-      for (std::size_t v = 0; v < to[own].size(); ++v)
-        if (const double a = to[own][v], b = to[other][v]; b < kUnreached)
-          out[own][v] = a < kUnreached ? static_cast<float>(smoothStep(2 * b / (a + b + 1e-12))) : 0.0F;
-    }
   return out;
+}
+
+// Along the skin for the feature points; through the air for those that were added, which lie between them.
+double SkinInterpolation::State::pointDistance(std::uint32_t v, std::size_t p) const {
+  if (p >= kFeaturePointCount)
+    return (problem.mesh.positions.row(v) - mask.geometry.points.row(static_cast<Eigen::Index>(p))).norm();
+  return std::min(problem.association.point_distance(v, static_cast<Eigen::Index>(p)), problem.association.reach);
 }
 
 SkinRows SkinInterpolation::rows() const {
@@ -258,8 +256,13 @@ SkinRows SkinInterpolation::rows() const {
       for (std::size_t p = first; p < last; ++p) {
         double w = x(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(p - first));
         if (!(std::abs(w) > kNegligible)) continue;
-        if (const auto& share = s.share_of_side[static_cast<std::size_t>(s.mask.geometry.point_side[p])]; !share.empty())
-          w *= static_cast<double>(share[s.vertex[i]]);  // step 3
+        // Step 3: a column of one side is led to zero towards the opposite side, from the full weight where the column's
+        // own point is as near as the opposite side, to nothing there.
+        const auto& others = s.to_opposite[static_cast<std::size_t>(s.mask.geometry.point_side[p])];
+        if (!others.empty() && others[s.vertex[i]] < kUnreached) {
+          const double other = others[s.vertex[i]];
+          w *= smoothStep(2 * other / (other + s.pointDistance(s.vertex[i], p) + 1e-12));
+        }
         if (!(std::abs(w) > kNegligible)) continue;
         out.point.push_back(static_cast<std::uint16_t>(p));
         out.weight.push_back(static_cast<float>(w));

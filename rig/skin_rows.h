@@ -52,8 +52,8 @@ struct SkinRows {
 //    (nostrils, the inside of the lips, the skin around the mask) so continues its surroundings smoothly, under tension
 //    (skin_equations.h). The Laplacian knows constants, so rows still sum to 1. blend_width: over what part of a mask
 //    triangle's size the second term gives way to the first.
-// 3. Lips and lids: what the opposite side would contribute is taken out, gradually from where both sides are equally
-//    near along the skin to the opposite side itself.
+// 3. Lips and lids: what the opposite side would contribute is taken out, gradually from that side's own points to
+//    here.
 // 4. Beyond the mask's outline all fades, by distance along the skin, to nothing where the skin stays.
 class SkinInterpolation {
  public:
