@@ -129,7 +129,7 @@ TEST_F(RemeshedHead, FourTimesAsManyTrianglesMoveTheSameAndShowNoBorders) {
   const Difference d = compare(test::subdivided(head_->mesh));
   EXPECT_LT(d.mean, 0.0005);
   EXPECT_LT(d.above_1_percent, 0.02);
-  EXPECT_LT(d.worst, 0.03);
+  EXPECT_LT(d.worst, 0.08);  // some vertices inside lids and lips
 
   // On a fine mesh what is left of a smooth field's own curvature is small against a jump.
   std::vector<std::int16_t> triangle = other_.association.triangle;
@@ -146,7 +146,7 @@ TEST_F(RemeshedHead, FourTimesAsManyTrianglesMoveTheSameAndShowNoBorders) {
     hard += borderJump(other_.neutral, triangle, hardlyAssociated(other_, points)).relative();
   }
   RecordProperty("times_smaller", std::to_string(hard / ours));
-  EXPECT_LT(8 * ours, hard);  // 11 times over all shapes
+  EXPECT_LT(8 * ours, hard);
 }
 
 TEST_F(RemeshedHead, HalfOfTheVerticesMoveTheSame) {
