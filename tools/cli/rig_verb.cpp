@@ -93,10 +93,11 @@ int run(Options options) {
                               (options.regions.empty() ? std::string() : " with " + options.regions);
   try {
     const CompletePoints complete = completePoints(mesh, given);
-    for (const std::string& note : complete.notes)
-      std::fprintf(stderr, "volto rig: note: %s: %s\n", options.mesh.c_str(), note.c_str());
     definition.check(mesh);
     const rig::Rig character = rig::buildRig(mesh, complete.points, rig_options);
+    // Not before: what is refused is told in one line.
+    for (const std::string& note : complete.notes)
+      std::fprintf(stderr, "volto rig: note: %s: %s\n", options.mesh.c_str(), note.c_str());
     rig::writeRig(options.output, character);
     if (!options.save_definition.empty()) {
       OutputFile file(options.save_definition);
