@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 
 #include "retarget/face_deformer.h"
+#include "retarget/shape_relations.h"
 #include "rig/errors.h"
 #include "rig/rigid_motion.h"
 
@@ -89,6 +90,13 @@ std::vector<std::string> replaceBlendshapes(rig::Rig& rig, std::span<const std::
   rig.combinations.clear();
   rig.blendshapes.assign(names.size(), {});
   rig.part_motions = eyeMotions(rig, positions);
+  for (const std::string& name : names) {
+    const std::vector<std::uint16_t> parents = parentsByName(name, names);
+    if (parents.empty()) continue;
+    rig::Combination& combination = rig.combinations.emplace_back();
+    combination.name = name;  // so the shape of this name follows its parents (shape_relations.h)
+    for (const std::uint16_t parent : parents) combination.drivers.push_back({parent, false});
+  }
   const auto vertex = featureVertices(rig);
   for (std::size_t k = 0; k < names.size(); ++k) {
     rig::Blendshape& shape = rig.blendshapes[k];

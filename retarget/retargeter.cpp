@@ -20,7 +20,7 @@ struct Retargeter::State {
       : options(wanted),
         scale(rig),
         deformer(rig),
-        solver(rig.blendshapes, rig.fapu.fapu.eye_separation),
+        solver(rig),
         weights(solver.shapeCount()),
         observed(solver.shapeCount()) {}
 };
