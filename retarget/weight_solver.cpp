@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "frames/arkit_blendshapes.h"
+#include "rig/shape_set.h"
 
 namespace volto::retarget {
 namespace {
@@ -148,11 +149,19 @@ void WeightSolver::readShapes(std::span<const rig::Blendshape> shapes) {
   const std::size_t blocks = (shapes.size() + kBlock - 1) / kBlock;
   basis_.assign(blocks * kCoordinates * kBlock, 0.0F);
   projected_.assign(blocks * kBlock, 0.0F);
+  std::vector<std::string> names;
+  for (const rig::Blendshape& shape : shapes) names.push_back(shape.name);
+  const rig::ShapeSet* const set = rig::shapeSetOf(names);
   std::array<std::vector<Move>, kFeaturePointCount> of_point;
   for (std::size_t k = 0; k < shapes.size(); ++k) {
     Shape shape;
     shape.moves_mask = false;
-    if (const auto arkit = arkitBlendshapeIndex(shapes[k].name)) shape.arkit = static_cast<std::int32_t>(*arkit);
+    // A shape that is one of ARKit's under another name, or its half (browInnerUp_L), has that one's prior.
+    const rig::ShapeSet::Shape* meaning = set == nullptr ? nullptr : set->find(shapes[k].name);
+    if (const auto arkit = arkitBlendshapeIndex(shapes[k].name))
+      shape.arkit = static_cast<std::int32_t>(*arkit);
+    else if (meaning != nullptr && meaning->parts.size() == 1)
+      shape.arkit = static_cast<std::int32_t>(meaning->parts[0].arkit);
     for (std::size_t p = 0; p < kFeaturePointCount && shapes[k].moves_mask; ++p) {
       const auto& by = shapes[k].mask_displacement[p];
       if (by[0] == 0.0F && by[1] == 0.0F && by[2] == 0.0F) continue;

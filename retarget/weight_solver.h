@@ -62,7 +62,7 @@ class WeightSolver {
   std::size_t shapeCount() const { return shapes_.size(); }
 
   // weights, observed: one per shape of the character, in its order. Weights are in 0..1 and finite whatever comes in.
-  //  - A shape with an ARKit name takes in.arkit_weights as its prior where in.arkit_observed says so. Where it does
+  //  - A shape that is one of ARKit's, by its own name or that of a set which Volto knows (rig/shape_set.h), takes in.arkit_weights as its prior where in.arkit_observed says so. Where it does
   //  not, the shape is not
   //    observed and its weight 0; unless in.arkit_observed is empty altogether (nobody has fitted anything): then the
   //    mask decides alone.
@@ -81,7 +81,7 @@ class WeightSolver {
 
  private:
   struct Shape {
-    std::int32_t arkit = -1;  // index of its ARKit name
+    std::int32_t arkit = -1;  // index of the ARKit shape that it is
     bool moves_mask = true;
     bool driven = false;  // a combination
   };

@@ -55,7 +55,6 @@ class AnimationScript {
 
   double durationS() const { return end_s_.empty() ? 0 : end_s_.back(); }
   std::size_t stepCount() const { return end_s_.size(); }
-  std::size_t shapeCount() const { return shapes_; }
 
  private:
   friend class ScriptParser;

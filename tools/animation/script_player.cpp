@@ -19,7 +19,8 @@ ScriptPlayer::ScriptPlayer(const rig::Rig& rig, const AnimationScript& script, d
       rate_hz_(rate_hz),
       with_mesh_(with_mesh),
       frames_(1 + static_cast<std::uint64_t>(std::floor(script.durationS() * rate_hz + 1e-9))),
-      deformer_(rig) {
+      deformer_(rig),
+      relations_(retarget::shapeRelations(rig.blendshapes, rig.combinations)) {
   for (const rig::Blendshape& shape : rig.blendshapes) {
     const auto index = arkitBlendshapeIndex(shape.name);
     arkit_.push_back(index ? static_cast<std::int32_t>(*index) : -1);
@@ -44,6 +45,9 @@ void ScriptPlayer::play(std::uint64_t frame) {
   avatar_.t_capture_ns = mask_.t_capture_ns = t_ns;
   avatar_.capture_seq = mask_.capture_seq = frame + 1;
   avatar_.weights = moment_.weights;
+  relations_.drive(avatar_.weights);
+  for (std::size_t k = 0; k < moment_.weights.size(); ++k)
+    if (moment_.weights[k] != 0) avatar_.weights[k] = moment_.weights[k];
   tracker::setHeadPose(tracker::headRotation({moment_.head_degrees[0] * kRadians, moment_.head_degrees[1] * kRadians,
                                               moment_.head_degrees[2] * kRadians}),
                        Eigen::Vector3d::Zero(), avatar_.head);

@@ -6,6 +6,7 @@
 #include "frames/avatar_frame.h"
 #include "frames/mask_frame.h"
 #include "retarget/face_deformer.h"
+#include "retarget/shape_relations.h"
 #include "rig/rig.h"
 #include "tools/animation/animation_script.h"
 
@@ -21,6 +22,7 @@ class ScriptPlayer {
   std::uint64_t frameCount() const { return frames_; }
   std::int64_t time(std::uint64_t frame) const;  // nanoseconds from the beginning
 
+  // A combination that the script leaves at 0 follows its parents.
   void play(std::uint64_t frame);
   // Of the last play(); t_capture_ns is time(frame).
   AvatarFrame& avatar() { return avatar_; }
@@ -34,6 +36,7 @@ class ScriptPlayer {
   bool with_mesh_;
   std::uint64_t frames_;
   retarget::FaceDeformer deformer_;
+  retarget::ShapeRelations relations_;
   std::vector<std::int32_t> arkit_;  // one per shape: index of its ARKit name, or -1
   AnimationScript::Moment moment_;
   AvatarFrame avatar_;

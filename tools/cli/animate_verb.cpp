@@ -141,8 +141,7 @@ int run(const Options& options) {
   if (files && !options.endpoint.empty())
     throw CommandError(kWrongUsage, "--publish plays in real time, files are written at once; give one or the other");
   if (files && options.loop) throw CommandError(kWrongUsage, "--loop is for --publish: a file would have no end");
-  if (options.files.animate && (options.files.png.empty() || options.files.sheet))
-    throw CommandError(kWrongUsage, "--animate makes one moving picture of --png F; it needs --png and no --sheet");
+  options.files.requireConsistent();
   if (!options.endpoint.empty()) protocol::parseEndpoint(options.endpoint);
   requireReadable(options.script, true);
   requireReadable(options.rig);
@@ -151,10 +150,7 @@ int run(const Options& options) {
     outputs.push_back(options.take);
     requireReplaceable(options.take);
   }
-  for (const std::string& output : outputs) {
-    if (options.script != "-") requireDifferent(options.script, output);
-    requireDifferent(options.rig, output);
-  }
+  requireDifferent({options.script, options.rig}, outputs);
   const rig::Rig rig = rig::readRig(options.rig);
   std::vector<std::string> shapes;
   for (const rig::Blendshape& shape : rig.blendshapes) shapes.push_back(shape.name);

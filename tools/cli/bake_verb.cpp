@@ -41,18 +41,13 @@ std::vector<std::size_t> framesToWrite(const pipeline::Performance& performance,
 
 int run(const Options& options) {
   const FrameFileFlags& files = options.files;
-  if (files.animate && (files.png.empty() || files.sheet)) {
-    throw CommandError(kWrongUsage, "--animate makes one moving picture of --png F; it needs --png and no --sheet");
-  }
+  files.requireConsistent();
   if (!files.any()) {
     throw CommandError(kWrongUsage,
                        "say what to make: --obj DIR, --glb F, --csv F, --livelink F or --png F; see volto help bake");
   }
   requireReadable(options.rig);
-  for (const std::string& output : files.files()) {
-    requireDifferent(options.take, output);
-    requireDifferent(options.rig, output);
-  }
+  requireDifferent({options.take, options.rig}, files.files());
   const rig::Rig rig = rig::readRig(options.rig);
   const pipeline::Performance performance = readPerformanceFor("bake", options.take);
   pipeline::FramePath path(rig, trackingOptions(options.tracking, performance),

@@ -33,12 +33,6 @@ struct Options {
 
 constexpr const char* kStopped = "stopped before the end; what is not complete was not written";
 
-bool isGlb(const std::string& path) {
-  std::string extension = std::filesystem::path(path).extension().string();
-  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return extension == ".glb";
-}
-
 exporter::Movement movementOf(const rig::Rig& rig, const Options& options) {
   const pipeline::Performance performance = readPerformanceFor("export", options.take);
   pipeline::FramePath path(rig, trackingOptions(options.tracking, performance), {.mesh = true, .weights = true});
@@ -55,7 +49,7 @@ exporter::Movement movementOf(const rig::Rig& rig, const Options& options) {
 
 int run(const Options& options) {
   requireReadable(options.rig);
-  if (!isGlb(options.output)) {
+  if (!hasExtension(options.output, ".glb")) {
     if (!options.take.empty())
       throw CommandError(kWrongUsage,
                          "--take goes into a GLB file; for a folder of OBJ files per frame use volto bake --obj");

@@ -19,12 +19,6 @@ namespace {
 
 constexpr std::size_t kDetectionBytes = 64 * 1024;
 
-bool hasExtension(const std::filesystem::path& path, std::string_view wanted) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return extension == wanted;
-}
-
 // A value on a line of its own, in words: numbers shortly, lists and objects by their length or, when short, whole.
 std::string inWords(const Json& value) {
   constexpr std::size_t kShort = 8;

@@ -1,12 +1,16 @@
 #include "tools/cli/frame_files.h"
 
+#include <optional>
+
 #include <CLI/CLI.hpp>
 
 #include "rig/file_bytes.h"
 #include "rig/mesh_io.h"
+#include "rig/shape_translation.h"
 #include "tools/cli/bake_picture.h"
 #include "tools/cli/exit_status.h"
 #include "tools/cli/output_file.h"
+#include "tools/cli/shape_set_flag.h"
 #include "tools/export/glb_file.h"
 #include "tools/export/livelink_csv.h"
 #include "tools/export/movement.h"
@@ -42,18 +46,36 @@ class ObjFile : public FrameFile {
   rig::ObjOptions options_;
 };
 
+// What the character's shapes mean, when the person says so.
+std::optional<rig::ShapeSet> meaningOf(const FrameFileFlags& flags) {
+  if (flags.shapes_mean.empty()) return {};
+  return readShapeSet(flags.shapes_mean);
+}
+
 class CsvFile : public FrameFile {
  public:
-  CsvFile(const std::string& path, const rig::Rig& rig) : file_(path) {
-    std::vector<std::string> names;
-    for (const rig::Blendshape& shape : rig.blendshapes) names.push_back(shape.name);
+  CsvFile(const FrameFileFlags& flags, const rig::Rig& rig) : file_(flags.csv) {
+    std::vector<std::string> names = rig::blendshapeNames(rig);
+    if (!flags.weights_as.empty()) {
+      const std::optional<rig::ShapeSet> meaning = meaningOf(flags);
+      translation_.emplace(names, meaning ? &*meaning : nullptr, readShapeSet(flags.weights_as));
+      names.clear();
+      for (const rig::ShapeSet::Shape& shape : translation_->to().shapes()) names.push_back(shape.name);
+      weights_.resize(names.size());
+      observed_.resize(names.size());
+    }
     pipeline::appendWeightsHeader(text_, names);
     file_.write(text_);
   }
 
   void frame(std::size_t, const AvatarFrame& avatar, std::int64_t t_ns) override {
     text_.clear();
-    pipeline::appendWeightsRow(text_, t_ns, avatar.weights, avatar.observed, avatar.head);
+    if (translation_) {
+      translation_->apply(avatar.weights, avatar.observed, weights_, observed_);
+      pipeline::appendWeightsRow(text_, t_ns, weights_, observed_, avatar.head);
+    } else {
+      pipeline::appendWeightsRow(text_, t_ns, avatar.weights, avatar.observed, avatar.head);
+    }
     file_.write(text_);
   }
 
@@ -62,11 +84,15 @@ class CsvFile : public FrameFile {
  private:
   OutputFile file_;
   std::string text_;
+  std::optional<rig::ShapeTranslation> translation_;
+  std::vector<float> weights_;
+  std::vector<std::uint8_t> observed_;
 };
 
 class LiveLinkFile : public FrameFile {
  public:
-  LiveLinkFile(const std::string& path, const rig::Rig& rig) : rows_(rig), file_(path) {
+  LiveLinkFile(const std::string& path, const rig::Rig& rig, const rig::ShapeSet* meaning)
+      : rows_(rig, meaning), file_(path) {
     file_.write(exporter::liveLinkHeader());
   }
 
@@ -113,6 +139,15 @@ class PngFile : public FrameFile {
 
 }  // namespace
 
+void FrameFileFlags::requireConsistent() const {
+  if (animate && (png.empty() || sheet))
+    throw CommandError(kWrongUsage, "--animate makes one moving picture of --png F; it needs --png and no --sheet");
+  if (!weights_as.empty() && csv.empty())
+    throw CommandError(kWrongUsage, "--weights-as says in which names --csv F is written; it needs --csv");
+  if (!shapes_mean.empty() && weights_as.empty() && livelink.empty())
+    throw CommandError(kWrongUsage, "--shapes-mean is for --livelink, and for --csv with --weights-as");
+}
+
 std::vector<std::string> FrameFileFlags::files() const {
   std::vector<std::string> out;
   for (const std::string& path : {csv, png, glb, livelink})
@@ -124,8 +159,11 @@ std::vector<std::unique_ptr<FrameFile>> openFrameFiles(const FrameFileFlags& fla
                                                        std::size_t frames) {
   std::vector<std::unique_ptr<FrameFile>> files;
   if (!flags.obj.empty()) files.push_back(std::make_unique<ObjFile>(flags.obj, rig.neutral));
-  if (!flags.csv.empty()) files.push_back(std::make_unique<CsvFile>(flags.csv, rig));
-  if (!flags.livelink.empty()) files.push_back(std::make_unique<LiveLinkFile>(flags.livelink, rig));
+  if (!flags.csv.empty()) files.push_back(std::make_unique<CsvFile>(flags, rig));
+  if (!flags.livelink.empty()) {
+    const std::optional<rig::ShapeSet> meaning = meaningOf(flags);
+    files.push_back(std::make_unique<LiveLinkFile>(flags.livelink, rig, meaning ? &*meaning : nullptr));
+  }
   if (!flags.glb.empty()) files.push_back(std::make_unique<GlbFile>(flags.glb, rig));
   if (!flags.png.empty()) files.push_back(std::make_unique<PngFile>(flags, rig, frames));
   return files;
@@ -145,6 +183,13 @@ void addFrameFileFlags(CLI::App& app, FrameFileFlags& flags) {
   app.add_option("--csv", flags.csv,
                  "weights of the character's blendshapes and head angles, a row per frame; - is standard output")
       ->type_name("F");
+  app.add_option("--weights-as", flags.weights_as,
+                 "write --csv in the names of another set: arkit, facs, ict, vrm0, vrm1, or a CSV file of your own")
+      ->type_name("SET");
+  app.add_option("--shapes-mean", flags.shapes_mean,
+                 "what the character's own shapes are in ARKit's terms (default: told by their names): the same sets, "
+                 "or a CSV file with shape,arkit,weight")
+      ->type_name("SET");
   app.add_option(
          "--png", flags.png,
          "pictures: a folder for one per frame, or with --sheet, or where the name ends in .png, one sheet of moments")

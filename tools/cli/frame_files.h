@@ -31,9 +31,12 @@ struct FrameFileFlags {
   bool sheet = false;
   bool animate = false;
   int size_px = 0;
+  std::string weights_as, shapes_mean;  // sets of blendshapes (tools/cli/shape_set_flag.h)
 
   bool any() const { return !(obj.empty() && csv.empty() && glb.empty() && livelink.empty() && png.empty()); }
   bool wantMesh() const { return !obj.empty() || !png.empty() || !glb.empty(); }
+  // Throws CommandError (kWrongUsage): flags that do not go together.
+  void requireConsistent() const;
   // Paths of single files, those that were given.
   std::vector<std::string> files() const;
 };

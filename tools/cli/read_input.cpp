@@ -75,4 +75,16 @@ void requireDifferent(const fs::path& in, const fs::path& out) {
   }
 }
 
+void requireDifferent(std::initializer_list<std::string> inputs, std::span<const std::string> outputs) {
+  for (const std::string& out : outputs)
+    for (const std::string& in : inputs)
+      if (!in.empty() && !out.empty()) requireDifferent(in, out);
+}
+
+bool hasExtension(const fs::path& path, std::string_view wanted) {
+  std::string extension = path.extension().string();
+  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return extension == wanted;
+}
+
 }  // namespace volto::cli

@@ -48,12 +48,9 @@ void checkPaths(const Options& options) {
   requireReadable(options.mesh);
   for (const std::string* in : {&options.points, &options.regions})
     if (!in->empty()) requireReadable(*in);
-  for (const std::string* out : {&options.output, &options.save_definition}) {
-    if (out->empty()) continue;
-    requireDifferent(options.mesh, *out);
-    if (!options.points.empty()) requireDifferent(options.points, *out);
-    requireReplaceable(*out);
-  }
+  requireDifferent({options.mesh, options.points}, std::vector{options.output, options.save_definition});
+  for (const std::string* out : {&options.output, &options.save_definition})
+    if (!out->empty()) requireReplaceable(*out);
   if (!options.regions.empty()) requireDifferent(options.regions, options.output);
   if (!options.save_definition.empty() && std::filesystem::path(options.save_definition) == options.output)
     throw CommandError(kWrongUsage, options.output + ": the rig and its definition cannot be one file");

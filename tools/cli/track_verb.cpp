@@ -27,11 +27,7 @@ struct Options {
 };
 
 int run(const Options& options) {
-  for (const std::string& output : {options.output, options.mask}) {
-    if (output.empty()) continue;
-    requireDifferent(options.landmarks, output);
-    requireDifferent(options.tracking.neutral, output);
-  }
+  requireDifferent({options.landmarks, options.tracking.neutral}, std::vector{options.output, options.mask});
   const pipeline::Performance performance = readPerformanceFor("track", options.landmarks);
   pipeline::Tracking tracking(trackingOptions(options.tracking, performance));
 

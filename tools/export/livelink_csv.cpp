@@ -52,25 +52,15 @@ std::string liveLinkHeader() {
   return out + "\n";
 }
 
-LiveLinkRows::LiveLinkRows(const rig::Rig& rig) {
-  bool any = false;
-  for (const rig::Blendshape& shape : rig.blendshapes) {
-    const auto index = arkitBlendshapeIndex(shape.name);
-    column_.push_back(index ? static_cast<int>(*index) : -1);
-    any = any || index;
-  }
-  if (!any)
-    throw rig::InputError("character '" + rig.name +
-                          "': none of its blendshapes has an ARKit name, so a Live Link Face file cannot hold them");
-}
+LiveLinkRows::LiveLinkRows(const rig::Rig& rig, const rig::ShapeSet* meaning)
+    : to_arkit_(rig::blendshapeNames(rig), meaning, *rig::ShapeSet::shipped("arkit")) {}
 
 void LiveLinkRows::append(std::string& out, std::int64_t t_ns, const AvatarFrame& avatar) const {
   appendTimecode(out, t_ns);
   out += ",61";
   std::array<float, kArkitBlendshapeCount> weights{};
-  for (std::size_t k = 0; k < column_.size() && k < avatar.weights.size(); ++k)
-    if (column_[k] >= 0 && (avatar.observed.empty() || avatar.observed[k] != 0))
-      weights[static_cast<std::size_t>(column_[k])] = avatar.weights[k];
+  std::array<std::uint8_t, kArkitBlendshapeCount> observed{};
+  to_arkit_.apply(avatar.weights, avatar.observed, weights, observed);
   for (const float weight : weights) appendDecimals(out += ',', weight);
   // The phone counts yaw to the subject's right and pitch as Volto's heads do; eyes down.
   std::array<float, 9> angles{};

@@ -6,6 +6,7 @@
 
 #include "frames/avatar_frame.h"
 #include "rig/rig.h"
+#include "rig/shape_translation.h"
 
 namespace volto::exporter {
 
@@ -16,15 +17,15 @@ std::string liveLinkHeader();
 // format has no other way to say it.
 class LiveLinkRows {
  public:
-  // Throws rig::InputError when none of the character's blendshapes has an ARKit name.
-  explicit LiveLinkRows(const rig::Rig& rig);
+  // What the character's shapes are in ARKit's terms: rig/shape_translation.h. Throws rig::InputError.
+  explicit LiveLinkRows(const rig::Rig& rig, const rig::ShapeSet* meaning = nullptr);
 
   // "HH:MM:SS:FF.fff,61,...": t_ns as a time of day with 60 frames a second, to a thousandth of a frame: the true time,
   // not a frame number. Angles as the phone counts them, radians.
   void append(std::string& out, std::int64_t t_ns, const AvatarFrame& avatar) const;
 
  private:
-  std::vector<int> column_;  // of each of the character's blendshapes, -1: none
+  rig::ShapeTranslation to_arkit_;
 };
 
 }  // namespace volto::exporter
