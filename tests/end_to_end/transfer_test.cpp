@@ -20,7 +20,8 @@ class Transfer : public World {
     const rig::Mesh head = rig::readMesh(headMesh());
     fs::create_directories(path("examples"));
     rig::VertexPositions moved = head.positions;
-    for (Eigen::Index v = 0; v < moved.rows(); ++v) moved(v, 1) += 0.1 * std::exp(-(std::pow(moved(v, 0), 2) + std::pow(moved(v, 1) + 5, 2)) / 2);
+    for (Eigen::Index v = 0; v < moved.rows(); ++v)
+      moved(v, 1) += 0.1 * std::exp(-(std::pow(moved(v, 0), 2) + std::pow(moved(v, 1) + 5, 2)) / 2);
     rig::writeObj(path("examples/lift.obj"), head, moved);
     rig::writeObj(path("examples/still.obj"), head, head.positions);
     return path("examples");
@@ -55,19 +56,53 @@ TEST_F(Transfer, WhatCannotBeTransferredIsNamed) {
                 .find("is a mesh that is not rigged; make its rig with volto rig"),
             std::string::npos);
   EXPECT_NE(complaint({"--source", rig(), "--examples", path("none"), "--target", rig(), "-o", path("o")}, 66)
-                .find("no such folder"),
+                .find("no such folder or file"),
             std::string::npos);
   EXPECT_NE(complaint({"--source", rig(), "--examples", good, "--target", rig(), "-o", good}, 2).find("would be lost"),
             std::string::npos);
-  EXPECT_NE(complaint({"--source", rig(), "--examples", good, "--target", rig(), "-o", path("o"), "--method", "magic"}, 2)
-                .find("use mask or deformation"),
-            std::string::npos);
+  EXPECT_NE(
+      complaint({"--source", rig(), "--examples", good, "--target", rig(), "-o", path("o"), "--method", "magic"}, 2)
+          .find("use mask or deformation"),
+      std::string::npos);
   fs::create_directories(path("other"));
   writeFile(path("other/smile.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   EXPECT_NE(complaint({"--source", rig(), "--examples", path("other"), "--target", rig(), "-o", path("o")}, 65)
                 .find("smile.obj: 3 vertices"),
             std::string::npos);
   EXPECT_FALSE(fs::exists(path("o")));
+}
+
+TEST_F(Transfer, MotionsOfTheMaskAreExamplesToo) {
+  const Finished run = volto({"transfer", "--examples", "table", "--target", rig(), "-o", path("table")});
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_NE(run.out.find("52 expressions of the mask"), std::string::npos);
+  // The shipped head's shapes were made of the same table.
+  writeFile(path("s.script"), "to 0.1: mouthSmileLeft 1\nto 0.1: mouthSmileLeft 0, jawOpen 1\n");
+  ASSERT_EQ(
+      volto({"animate", path("s.script"), "--rig", rig(), "--rate", "10", "--obj", path("o"), "--take", path("s.take")})
+          .status,
+      0);
+  const auto farthest = [&](const std::string& a, const std::string& b) {
+    return (rig::readMesh(path(a)).positions - rig::readMesh(path(b)).positions).rowwise().norm().maxCoeff();
+  };
+  EXPECT_LT(farthest("table/mouthSmileLeft.obj", "o/frame_000001.obj"), 2e-3);  // the head is 20 wide
+  EXPECT_LT(farthest("table/jawOpen.obj", "o/frame_000002.obj"), 2e-3);
+  ASSERT_EQ(
+      volto({"transfer", "--examples", path("s.take"), "--target", rig(), "-o", path("take"), "--every", "2"}).status,
+      0);
+  EXPECT_LT(farthest("take/frame_000002.obj", "o/frame_000002.obj"), 2e-2);
+  EXPECT_FALSE(fs::exists(path("take/frame_000001.obj")));
+
+  const Finished no_mesh =
+      volto({"transfer", "--examples", "table", "--target", rig(), "-o", path("x"), "--method", "deformation"});
+  EXPECT_EQ(no_mesh.status, 2);
+  EXPECT_NE(no_mesh.err.find("use --method mask"), std::string::npos);
+  const Finished no_source = volto({"transfer", "--examples", examples(), "--target", rig(), "-o", path("x")});
+  EXPECT_EQ(no_source.status, 2);
+  EXPECT_NE(no_source.err.find("--source S.rig is missing"), std::string::npos);
+  writeFile(path("text.take"), "no take");
+  EXPECT_EQ(volto({"transfer", "--examples", path("text.take"), "--target", rig(), "-o", path("x")}).status, 65);
+  EXPECT_FALSE(fs::exists(path("x")));
 }
 
 TEST_F(Transfer, SetOfItsOwnComesBackFromGlbWhereItWas) {
@@ -99,7 +134,8 @@ TEST_F(Transfer, FilesWithoutShapesAreRefused) {
 
 TEST_F(Transfer, ScriptGivesTheSameFramesInTakeAndTable) {
   writeFile(path("a.script"), "to 0.5: jawOpen 0.8, headYaw 10\nneutral 0.5 smooth\n");
-  const Finished run = volto({"animate", path("a.script"), "--rig", rig(), "--take", path("a.take"), "--csv", path("a.csv")});
+  const Finished run =
+      volto({"animate", path("a.script"), "--rig", rig(), "--take", path("a.take"), "--csv", path("a.csv")});
   ASSERT_EQ(run.status, 0) << run.err;
   ASSERT_EQ(volto({"bake", path("a.take"), "--rig", rig(), "--csv", path("b.csv")}).status, 0);
   std::istringstream a(readFile(path("a.csv"))), b(readFile(path("b.csv")));

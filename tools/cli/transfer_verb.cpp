@@ -9,10 +9,12 @@
 
 #include <CLI/CLI.hpp>
 
+#include "retarget/retargeter.h"
 #include "rig/mesh_io.h"
 #include "rig/parallel.h"
 #include "rig/rig_file.h"
 #include "tools/cli/exit_status.h"
+#include "tools/cli/mask_examples.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/progress.h"
 #include "tools/cli/read_input.h"
@@ -27,7 +29,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 struct Options {
-  std::string source, examples, target, output, method = "deformation";
+  std::string source, examples, target, output, method;
+  std::size_t every = 1;
   int threads = 0;
   bool quiet = false;
 };
@@ -36,7 +39,7 @@ double secondsSince(Clock::time_point start) { return std::chrono::duration<doub
 
 transfer::Method methodOf(const std::string& name) {
   if (name == "mask") return transfer::Method::mask;
-  if (name == "deformation") return transfer::Method::deformation;
+  if (name.empty() || name == "deformation") return transfer::Method::deformation;
   if (name == "individual")
     throw CommandError(
         kWrongUsage,
@@ -57,12 +60,45 @@ std::filesystem::path resultPath(const Options& options, const std::filesystem::
   return std::filesystem::path(options.output) / example.filename().replace_extension(".obj");
 }
 
+// Example motions of the mask have no mesh of their own, so nothing but the mask can carry them: each target vertex
+// follows it by the target's own regions, scaled by the target's FAPU, as live faces do.
+int runMaskExamples(const Options& options) {
+  if (methodOf(options.method) != transfer::Method::mask && !options.method.empty())
+    throw CommandError(kWrongUsage, "--method " + options.method + ": " + options.examples +
+                                        " holds motions of the mask and no meshes; use --method mask");
+  const rig::Rig target = readCharacter(options.target);
+  const MaskExamples examples = readMaskExamples(options.examples, options.every);
+  makeOutputFolder(options.output);
+  retarget::Retargeter retargeter(target, {.mesh = true, .weights = false});
+  AvatarFrame avatar;
+  rig::VertexPositions positions = target.neutral.positions;
+  Progress progress("expression", examples.frames.size());
+  for (std::size_t k = 0; k < examples.frames.size(); ++k) {
+    if (stopRequested()) throw CommandError(kFailed, "stopped before the end; the folder is not complete");
+    retargeter.reset();  // each expression by itself
+    retargeter.push(examples.frames[k], avatar);
+    for (Eigen::Index v = 0; v < positions.rows(); ++v)
+      for (Eigen::Index axis = 0; axis < 3; ++axis)
+        positions(v, axis) =
+            static_cast<double>(avatar.vertices[static_cast<std::size_t>(v)][static_cast<std::size_t>(axis)]);
+    rig::writeObj(std::filesystem::path(options.output) / (examples.names[k] + ".obj"), target.neutral, positions);
+    progress.show(k);
+  }
+  if (!options.quiet) std::printf("%zu expressions of the mask to %s\n", examples.frames.size(), target.name.c_str());
+  return kDone;
+}
+
 int run(const Options& options) {
+  if (options.examples == "table" || std::filesystem::is_regular_file(options.examples))
+    return runMaskExamples(options);
   const transfer::Method method = methodOf(options.method);
+  if (options.source.empty())
+    throw CommandError(kWrongUsage, "--source S.rig is missing: the character whose expressions the meshes in " +
+                                        options.examples + " are");
   const rig::Rig source = readCharacter(options.source), target = readCharacter(options.target);
   if (!std::filesystem::is_directory(options.examples))
-    throw CommandError(kNoInput,
-                       options.examples + ": no such folder; it holds one mesh per expression of " + options.source);
+    throw CommandError(kNoInput, options.examples + ": no such folder or file; it holds one mesh per expression of " +
+                                     options.source + ", or is a take, or the word table");
   std::error_code error;
   if (std::filesystem::equivalent(options.examples, options.output, error))
     throw CommandError(kWrongUsage,
@@ -90,7 +126,7 @@ int run(const Options& options) {
   if (options.quiet) return kDone;
 
   std::printf("%zu expressions of %s to %s by %s\n", results.size(), source.name.c_str(), target.name.c_str(),
-              options.method.c_str());
+              method == transfer::Method::mask ? "mask" : "deformation");
   if (method == transfer::Method::mask)
     std::printf("mask: %zu points on the target%s\n", transfer.maskPoints(),
                 transfer.sameMesh() ? ", read off the same vertices of the source" : "");
@@ -110,13 +146,17 @@ int run(const Options& options) {
 
 RunVerb defineTransfer(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("--source", options->source, "the character whose expressions they are, made by volto rig")
-      ->required()
+  app.add_option("--source", options->source, "the character whose expressions the meshes are, made by volto rig")
       ->type_name("S.rig");
   app.add_option("--examples", options->examples,
-                 "folder of meshes: the source's mesh, one file per expression, vertices in the same order")
+                 "folder of meshes: the source's mesh, one file per expression, vertices in the same order; or motions "
+                 "of the mask, which need no source: a take or a CSV file as for volto bake, or table for the 52 ARKit "
+                 "shapes of Volto's expression table")
       ->required()
-      ->type_name("DIR");
+      ->type_name("DIR|TAKE|table");
+  app.add_option("--every", options->every, "of a take, every Nth frame (default 1)")
+      ->type_name("N")
+      ->check(CLI::Range(std::size_t{1}, std::size_t{1000000}));
   app.add_option("--target", options->target, "the character that gets them, made by volto rig")
       ->required()
       ->type_name("T.rig");
