@@ -4,6 +4,10 @@
 #include <cmath>
 #include <initializer_list>
 #include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "capture/detection/crop_kernel.h"
 
 namespace volto::capture {
 namespace {
@@ -33,35 +37,131 @@ Axes axesOf(const FaceAnchors& p) {
           mouth_y - eyes_y,  0.5 * (eyes_x + mouth_x), 0.5 * (eyes_y + mouth_y)};
 }
 
-constexpr int kFixed = 16;  // bits behind the point
-constexpr double kOne = 1 << kFixed;
+constexpr double kOne = 1 << kFixedBits;
 constexpr int kMostTaps = 8;
 
-// One sample between four pixels.
-struct Bilinear {
+// Largest integer below; std::floor is a call where the processor is not known to have SSE 4.1.
+std::int64_t floorOf(double x) {
+  const auto towards_zero = static_cast<std::int64_t>(x);
+  return towards_zero - (static_cast<double>(towards_zero) > x ? 1 : 0);
+}
+
+// Pixels by their place; what lies outside is the border's pixel, or nothing.
+struct Pixels {
   const Image& image;
   bool black_outside;
 
-  void add(std::int64_t x, std::int64_t y, float* sum) const {
-    const auto ix = static_cast<int>(x >> kFixed), iy = static_cast<int>(y >> kFixed);
-    const auto fx = static_cast<float>(x & ((1 << kFixed) - 1)) * (1.0F / (1 << kFixed));
-    const auto fy = static_cast<float>(y & ((1 << kFixed) - 1)) * (1.0F / (1 << kFixed));
-    const float weight[2][2] = {{(1 - fx) * (1 - fy), fx * (1 - fy)}, {(1 - fx) * fy, fx * fy}};
-    for (int dy = 0; dy < 2; ++dy) {
-      for (int dx = 0; dx < 2; ++dx) {
-        int px = ix + dx, py = iy + dy;
-        if (px < 0 || py < 0 || px >= image.width || py >= image.height) {
-          if (black_outside) continue;
-          px = std::clamp(px, 0, image.width - 1);
-          py = std::clamp(py, 0, image.height - 1);
-        }
-        const std::uint8_t* const at =
-            image.bgr.data() +
-            3 * (static_cast<std::size_t>(py) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(px));
-        for (int c = 0; c < 3; ++c) sum[c] += weight[dy][dx] * static_cast<float>(at[c]);
+  const std::uint8_t* inside(int x, int y) const {
+    return image.bgr.data() +
+           3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x));
+  }
+  const std::uint8_t* operator()(int x, int y) const {
+    if (x < 0 || y < 0 || x >= image.width || y >= image.height) {
+      if (black_outside) return nullptr;
+      x = std::clamp(x, 0, image.width - 1);
+      y = std::clamp(y, 0, image.height - 1);
+    }
+    return inside(x, y);
+  }
+};
+
+// One sample between four pixels. x, y: fixed point.
+std::array<float, 3> bilinear(const Pixels& pixels, std::int64_t x, std::int64_t y) {
+  const auto ix = static_cast<int>(x >> kFixedBits), iy = static_cast<int>(y >> kFixedBits);
+  const auto fx = static_cast<float>(x & ((1 << kFixedBits) - 1)) * (1.0F / (1 << kFixedBits));
+  const auto fy = static_cast<float>(y & ((1 << kFixedBits) - 1)) * (1.0F / (1 << kFixedBits));
+  const float weight[4] = {(1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy};
+  std::array<float, 3> sum{};
+  for (int k = 0; k < 4; ++k) {
+    const std::uint8_t* const at = pixels(ix + k % 2, iy + k / 2);
+    if (at == nullptr) continue;
+    for (std::size_t c = 0; c < 3; ++c) sum[c] += weight[k] * static_cast<float>(at[c]);
+  }
+  return sum;
+}
+
+// Along a line of samples, `step` apart, added up.
+std::array<int, 3> sumOf(const Pixels& pixels, std::int64_t x, std::int64_t y, std::int64_t step_x, std::int64_t step_y,
+                         int samples) {
+  std::array<int, 3> sum{};
+  for (int i = 0; i < samples; ++i, x += step_x, y += step_y) {
+    const std::uint8_t* const at = pixels(static_cast<int>(x >> kFixedBits), static_cast<int>(y >> kFixedBits));
+    if (at == nullptr) continue;
+    for (std::size_t c = 0; c < 3; ++c) sum[c] += at[c];
+  }
+  return sum;
+}
+
+// Whether a crop lies within the image so far that no sample, nor what is beside it, is outside.
+bool liesInside(const Image& image, const ImageFromCrop& image_from_crop, int width, int height) {
+  for (const auto& [x, y] : {std::pair{0, 0}, {width, 0}, {0, height}, {width, height}}) {
+    const auto at = image_from_crop(x, y);
+    const auto within = [](float v, int size) { return v >= 2 && v <= static_cast<float>(size - 3); };
+    if (!within(at[0], image.width) || !within(at[1], image.height)) return false;
+  }
+  return true;
+}
+
+// The same samples of a crop that is not turned (a detector's): each line of them lies in one row of the image, and
+// below each other they are in the same columns. So the rows are added first, bytes side by side, then the columns.
+class UprightAverage {
+ public:
+  UprightAverage(const Pixels& pixels, const ImageFromCrop& image_from_crop, int width, int n)
+      : pixels_(pixels), image_from_crop_(image_from_crop), n_(n) {
+    const int last = pixels.image.width - 1;
+    const double step = 1.0 / n;
+    const auto step_x = static_cast<std::int64_t>(std::llround(image_from_crop.a * step * kOne));
+    columns_.reserve(static_cast<std::size_t>(width) * static_cast<std::size_t>(n));
+    first_ = last;
+    int end = 0;
+    for (int column = 0; column < width; ++column) {
+      std::int64_t x = floorOf((image_from_crop.a * (column + 0.5 * step) + image_from_crop.tx) * kOne);
+      for (int j = 0; j < n; ++j, x += step_x) {
+        const auto at = static_cast<int>(x >> kFixedBits);
+        const bool outside = at < 0 || at > last;
+        columns_.push_back(outside && pixels.black_outside ? kNothing : std::clamp(at, 0, last));
+        if (columns_.back() == kNothing) continue;
+        first_ = std::min(first_, columns_.back());
+        end = std::max(end, columns_.back() + 1);
       }
     }
+    sums_.resize(3 * static_cast<std::size_t>(std::max(end - first_, 0)));
   }
+
+  // put(column, blue, green, red), sums of n x n samples.
+  template <typename Put>
+  void row(int row, const Put& put) {
+    std::fill(sums_.begin(), sums_.end(), std::uint16_t{0});  // at most 8 bytes
+    for (int i = 0; i < n_; ++i) {
+      const double y0 = row + (i + 0.5) * (1.0 / n_);
+      const auto y = static_cast<int>(floorOf((image_from_crop_.a * y0 + image_from_crop_.ty) * kOne) >> kFixedBits);
+      const int last = pixels_.image.height - 1;
+      if ((y < 0 || y > last) && pixels_.black_outside) continue;
+      const std::uint8_t* const bytes = pixels_.inside(first_, std::clamp(y, 0, last));
+      for (std::size_t k = 0; k < sums_.size(); ++k) sums_[k] = static_cast<std::uint16_t>(sums_[k] + bytes[k]);
+    }
+    const int* column = columns_.data();
+    for (std::size_t at = 0; at < columns_.size() / static_cast<std::size_t>(n_); ++at) {
+      unsigned blue = 0, green = 0, red = 0;
+      for (int j = 0; j < n_; ++j, ++column) {
+        if (*column == kNothing) continue;
+        const std::uint16_t* const sum = sums_.data() + 3 * static_cast<std::size_t>(*column - first_);
+        blue += sum[0];
+        green += sum[1];
+        red += sum[2];
+      }
+      put(at, static_cast<float>(blue), static_cast<float>(green), static_cast<float>(red));
+    }
+  }
+
+ private:
+  static constexpr int kNothing = -1;
+  const Pixels& pixels_;
+  const ImageFromCrop& image_from_crop_;
+  int n_;
+  int first_ = 0;                    // the image's leftmost column that is looked at
+  std::vector<int> columns_;         // of the image, n for each of the crop
+  std::vector<std::uint16_t> sums_;  // of the rows, three colours each, from column first_ on
 };
 
 }  // namespace
@@ -113,9 +213,6 @@ void sampleCrop(const Image& image, const ImageFromCrop& image_from_crop, int wi
   if (planes.size() < 3 * plane) throw std::invalid_argument("too little room for a crop");
   // n x n samples a pixel; pixel centres lie at half.
   const int n = std::clamp(static_cast<int>(std::lround(image_from_crop.scale())), 1, kMostTaps);
-  const double step = 1.0 / n;
-  const auto step_ax = static_cast<std::int64_t>(std::llround(image_from_crop.a * step * kOne));
-  const auto step_ay = static_cast<std::int64_t>(std::llround(image_from_crop.b * step * kOne));
   const float share = 1.0F / static_cast<float>(n * n);
   std::array<float, 3> factor, offset;
   std::array<float*, 3> out;
@@ -125,38 +222,42 @@ void sampleCrop(const Image& image, const ImageFromCrop& image_from_crop, int wi
     offset[c] = -normalisation.mean[channel] / normalisation.deviation[channel];
     out[c] = planes.data() + channel * plane;
   }
-  const Bilinear bilinear{image, black_outside};
+  const Pixels pixels{image, black_outside};
+  const auto put = [&](std::size_t at, float blue, float green, float red) {
+    out[0][at] = blue * factor[0] + offset[0];
+    out[1][at] = green * factor[1] + offset[1];
+    out[2][at] = red * factor[2] + offset[2];
+  };
+  const ImageFromCrop& m = image_from_crop;
+  if (n > 1 && m.b == 0 && m.a > 0) {
+    UprightAverage average(pixels, m, width, n);
+    for (int row = 0; row < height; ++row) {
+      const std::size_t start = static_cast<std::size_t>(row) * static_cast<std::size_t>(width);
+      average.row(
+          row, [&](std::size_t column, float blue, float green, float red) { put(start + column, blue, green, red); });
+    }
+    return;
+  }
+  if (liesInside(image, m, width, height) && sampleInside({&image, m, width, height, n, out, factor, offset})) return;
+  const double step = 1.0 / n, shift = n == 1 ? -0.5 : 0.0;
+  const auto step_x = static_cast<std::int64_t>(std::llround(m.a * step * kOne));
+  const auto step_y = static_cast<std::int64_t>(std::llround(m.b * step * kOne));
   std::size_t at = 0;
   for (int row = 0; row < height; ++row) {
     for (int column = 0; column < width; ++column, ++at) {
-      float sum[3] = {0, 0, 0};
+      std::array<float, 3> sum{};
       for (int i = 0; i < n; ++i) {
         const double x0 = column + 0.5 * step, y0 = row + (i + 0.5) * step;
-        const double shift = n == 1 ? -0.5 : 0.0;
-        auto x = static_cast<std::int64_t>(
-            std::floor((image_from_crop.a * x0 - image_from_crop.b * y0 + image_from_crop.tx + shift) * kOne));
-        auto y = static_cast<std::int64_t>(
-            std::floor((image_from_crop.b * x0 + image_from_crop.a * y0 + image_from_crop.ty + shift) * kOne));
+        const std::int64_t x = floorOf((m.a * x0 - m.b * y0 + m.tx + shift) * kOne);
+        const std::int64_t y = floorOf((m.b * x0 + m.a * y0 + m.ty + shift) * kOne);
         if (n == 1) {
-          bilinear.add(x, y, sum);
-          continue;
-        }
-        for (int j = 0; j < n; ++j, x += step_ax, y += step_ay) {
-          auto px = static_cast<int>(x >> kFixed), py = static_cast<int>(y >> kFixed);
-          if (px < 0 || py < 0 || px >= image.width || py >= image.height) {
-            if (black_outside) continue;
-            px = std::clamp(px, 0, image.width - 1);
-            py = std::clamp(py, 0, image.height - 1);
-          }
-          const std::uint8_t* const pixel =
-              image.bgr.data() +
-              3 * (static_cast<std::size_t>(py) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(px));
-          sum[0] += static_cast<float>(pixel[0]);
-          sum[1] += static_cast<float>(pixel[1]);
-          sum[2] += static_cast<float>(pixel[2]);
+          sum = bilinear(pixels, x, y);
+        } else {
+          const auto line = sumOf(pixels, x, y, step_x, step_y, n);
+          for (std::size_t c = 0; c < 3; ++c) sum[c] += static_cast<float>(line[c]);
         }
       }
-      for (std::size_t c = 0; c < 3; ++c) out[c][at] = sum[c] * factor[c] + offset[c];
+      put(at, sum[0], sum[1], sum[2]);
     }
   }
 }

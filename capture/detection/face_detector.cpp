@@ -126,6 +126,10 @@ FaceDetector::FaceDetector(const ModelManifest& manifest, std::string_view onnx,
 FaceDetector::~FaceDetector() = default;
 FaceDetector::FaceDetector(FaceDetector&&) noexcept = default;
 
+std::int64_t FaceDetector::network_ns() const {
+  return state_->full.network.spent_ns() + (state_->near ? state_->near->network.spent_ns() : 0);
+}
+
 void FaceDetector::detect(const Image& image, float least_score, std::vector<DetectedFace>& out) {
   State& s = *state_;
   out.clear();

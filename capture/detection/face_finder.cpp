@@ -245,6 +245,7 @@ void FaceFinder::push(const Image& image, LandmarkFrame& out) {
     s.following = false;
   }
   if (!found) found = s.search(image, out);
+  s.counters.networks_ns = s.detector.network_ns() + s.model.network_ns();
   s.following = found;
   out.face_present = found;
   if (!found) {

@@ -32,6 +32,7 @@ struct FaceFinderCounters {
   std::uint64_t doubts = 0;                                       // times that the followed face became doubtful
   std::uint64_t losses = 0;                                       // times that it was lost
   std::int64_t detector_ns = 0, landmarks_ns = 0, pupils_ns = 0;  // spent, in total
+  std::int64_t networks_ns = 0;                                   // of that, in the networks themselves
 };
 
 // Thread-bound. Same images, same landmarks.

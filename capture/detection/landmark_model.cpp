@@ -114,6 +114,8 @@ bool LandmarkModel::crop(const FaceAnchors& in_image, ImageFromCrop& out) const 
   return cropOf(in_image, state_->manifest.crop, state_->manifest.width, state_->manifest.height, out);
 }
 
+std::int64_t LandmarkModel::network_ns() const { return state_->network.spent_ns(); }
+
 float LandmarkModel::run(const Image& image, const ImageFromCrop& image_from_crop, LandmarkFrame& out) {
   State& s = *state_;
   sampleCrop(image, image_from_crop, s.manifest.width, s.manifest.height, s.normalisation, false, s.network.input());

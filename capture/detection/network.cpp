@@ -1,7 +1,10 @@
 #include "capture/detection/network.h"
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <cmath>
+#include <optional>
 #include <string>
 
 #if defined(__SSE__)
@@ -11,6 +14,8 @@
 
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/dnn.hpp>
+
+#include "capture/detection/thread_choice.h"
 
 namespace volto::capture {
 namespace {
@@ -33,6 +38,13 @@ class FlushToZero {
   FlushToZero& operator=(const FlushToZero&) = delete;
 };
 
+std::atomic<bool> threads_are_measured{false};
+
+std::int64_t nowNs() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
 // OpenCV's messages run over several lines and name its own source files; the reason is in between.
 std::string reasonOf(const cv::Exception& error) {
   std::string text = error.err.empty() ? error.msg : error.err;
@@ -51,6 +63,23 @@ struct Network::State {
   std::vector<std::string> names;
   std::vector<cv::Mat> mats;
   std::vector<Output> outputs;
+  std::optional<ThreadChoice> threads;
+  std::int64_t spent_ns = 0;
+
+  void forward() {
+    const FlushToZero flush;
+    const bool measured = threads_are_measured;
+    if (measured) {
+      if (!threads) threads.emplace(cv::getNumberOfCPUs());
+      cv::setNumThreads(threads->threads());  // of the process, not of this network; takes a microsecond
+    }
+    const std::int64_t before = nowNs();
+    net.setInput(input);
+    net.forward(mats, names);
+    const std::int64_t took = nowNs() - before;
+    spent_ns += took;
+    if (measured) threads->took(took);
+  }
 };
 
 Network::Network(std::string_view onnx, const std::string& name, int width, int height)
@@ -76,6 +105,8 @@ Network::Network(std::string_view onnx, const std::string& name, int width, int 
       if (!std::isfinite(value)) throw InputError(name + ": gives numbers that are not finite; the file is damaged");
     }
   }
+  s.spent_ns = 0;  // the first run prepares; it is no measure of those to come
+  s.threads.reset();
 }
 
 Network::~Network() = default;
@@ -86,10 +117,8 @@ std::span<float> Network::input() { return {state_->input.ptr<float>(), state_->
 
 const std::vector<Network::Output>& Network::run() {
   State& s = *state_;
-  const FlushToZero flush;
   try {
-    s.net.setInput(s.input);
-    s.net.forward(s.mats, s.names);
+    s.forward();
   } catch (const cv::Exception& error) {
     throw InputError(s.name + ": cannot be run on a picture of " + std::to_string(s.input.size[3]) + "x" +
                      std::to_string(s.input.size[2]) + " (" + reasonOf(error) + "); does its manifest fit it?");
@@ -115,7 +144,14 @@ const Network::Output* Network::output(std::string_view name) const {
 
 const std::vector<Network::Output>& Network::outputs() const { return state_->outputs; }
 
-void setNetworkThreads(int threads) { cv::setNumThreads(threads > 0 ? threads : cv::getNumberOfCPUs()); }
+std::int64_t Network::spent_ns() const { return state_->spent_ns; }
+
+void setNetworkThreads(int threads) {
+  threads_are_measured = false;
+  cv::setNumThreads(threads > 0 ? threads : cv::getNumberOfCPUs());
+}
+
+void measureNetworkThreads() { threads_are_measured = true; }
 
 std::string openCvVersion() { return cv::getVersionString(); }
 

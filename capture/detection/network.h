@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
@@ -36,14 +37,19 @@ class Network {
   // Of the last run; null when there is none of that name.
   const Output* output(std::string_view name) const;
   const std::vector<Output>& outputs() const;
+  // Spent in run(), of all runs.
+  std::int64_t spent_ns() const;
 
  private:
   struct State;
   std::unique_ptr<State> state_;
 };
 
-// How many threads all networks of the process may use together. 0: as many as there are processors.
+// How many threads all networks of the process may use together. 0: as many as there are processors. Other numbers of
+// threads give other rounding errors (the last bit), so with a fixed number the same picture gives the same landmarks.
 void setNetworkThreads(int threads);
+// From now on each network finds out by itself whether one thread or all are quicker (thread_choice.h).
+void measureNetworkThreads();
 // The version of OpenCV in use: "4.6.0".
 std::string openCvVersion();
 

@@ -97,7 +97,7 @@ class VideoSource final : public ImageSource {
       started_ = true;
       start_ = Clock::now();
     }
-    // Of the pictures that are due the newest; decoding goes on while they are.
+    // Of the pictures that are due the newest, or the first that is not too late; decoding goes on while they are.
     bool have = false;
     for (;;) {
       if (!have_ahead_) {
@@ -118,6 +118,7 @@ class VideoSource final : public ImageSource {
       std::swap(out, ahead_);
       have_ahead_ = false;
       have = true;
+      if (now - due <= options_.patience) return given(out);
     }
   }
 

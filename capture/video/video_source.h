@@ -1,6 +1,7 @@
 // Videos, animated GIFs, photos and image sequences as an ImageSource: whatever FFmpeg's libraries open.
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <memory>
 
@@ -12,6 +13,8 @@ struct VideoOptions {
   // false: every picture, as fast as it is asked for. true: each when it is due, and of several that are due the
   // newest.
   bool realtime = false;
+  // In real time: a picture that is at most so late is given all the same, so that a short stall loses none.
+  std::chrono::nanoseconds patience{0};
   bool loop = false;             // from the start again; times go on rising
   double sequence_rate_hz = 25;  // of an image sequence, which does not say
 };

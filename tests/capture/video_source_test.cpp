@@ -4,6 +4,7 @@
 #include <fstream>
 #include <iterator>
 #include <system_error>
+#include <thread>
 
 #include <gtest/gtest.h>
 
@@ -104,6 +105,18 @@ TEST_F(Sequence, InRealTimeALateCallerGetsTheNewestAndTheOthersAreCounted) {
   ASSERT_EQ(source->next(image, 1s), Next::frame);
   EXPECT_EQ(image.capture_seq, 5U);
   EXPECT_EQ(source->counters().dropped, 3U);
+}
+
+TEST_F(Sequence, InRealTimeWithPatienceALateCallerMissesNothing) {
+  const auto source = openVideo(dir / "f%03d.ppm", {.realtime = true, .patience = 60s, .sequence_rate_hz = 50});
+  Image image;
+  ASSERT_EQ(source->next(image, 1s), Next::frame);
+  std::this_thread::sleep_for(100ms);
+  for (std::uint64_t seq = 2; seq <= 5; ++seq) {
+    ASSERT_EQ(source->next(image, 1s), Next::frame);
+    EXPECT_EQ(image.capture_seq, seq);
+  }
+  EXPECT_EQ(source->counters().dropped, 0U);
 }
 
 TEST_F(Sequence, ATimeoutIsKept) {

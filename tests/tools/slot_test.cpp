@@ -48,6 +48,42 @@ TEST(Slot, WhenEveryFrameCountsNoneIsLostAndTheOrderIsKept) {
   EXPECT_EQ(slot.replaced(), 0U);
 }
 
+TEST(Slot, WithRoomForAFewTheyComeInTheirOrderAndTheOldestGivesWay) {
+  Numbers slot(SlotPolicy::newest_wins, 3);
+  std::vector<int> got;
+  int next = 0;
+  for (int round = 0; round < 4; ++round) {  // round the ring
+    for (int i = 0; i < 5; ++i) {
+      std::vector<int> item{next++};
+      EXPECT_TRUE(slot.put(item));
+    }
+    EXPECT_EQ(slot.waiting(), 3U);
+    for (int i = 3; i > 0; --i) {
+      ASSERT_EQ(slot.take(got, 0s), Numbers::Taken::item);
+      EXPECT_EQ(got, std::vector<int>{next - i});
+    }
+    EXPECT_EQ(slot.take(got, 0s), Numbers::Taken::nothing);
+  }
+  EXPECT_EQ(slot.replaced(), 8U);
+}
+
+TEST(Slot, WhatStillWaitsWhenItIsClosedIsTakenUnlessItIsThrownAway) {
+  for (const bool throw_away : {false, true}) {
+    Numbers slot(SlotPolicy::newest_wins, 3);
+    for (int i = 0; i < 2; ++i) {
+      std::vector<int> item{i};
+      slot.put(item);
+    }
+    slot.close(throw_away);
+    std::vector<int> got;
+    for (int i = 0; i < 2 && !throw_away; ++i) {
+      ASSERT_EQ(slot.take(got, 0s), Numbers::Taken::item);
+      EXPECT_EQ(got, std::vector<int>{i});
+    }
+    EXPECT_EQ(slot.take(got, 0s), Numbers::Taken::closed);
+  }
+}
+
 TEST(Slot, MemoryGoesRound) {
   Numbers slot(SlotPolicy::newest_wins);
   std::vector<int> a(100, 1), b;

@@ -40,6 +40,7 @@ namespace {
 
 constexpr double kMostSmoothing = 100.0;
 constexpr auto kStep = std::chrono::milliseconds(100);
+constexpr auto kPatience = std::chrono::milliseconds(250);  // with a file whose reading stalled
 
 struct Options {
   std::string source;
@@ -85,7 +86,7 @@ pipeline::LiveInput openInput(const Options& options) {
     return input;
   }
   input.live = false;
-  capture::VideoOptions video{.realtime = options.realtime, .loop = options.loop};
+  capture::VideoOptions video{.realtime = options.realtime, .patience = kPatience, .loop = options.loop};
   if (options.camera.fps > 0) video.sequence_rate_hz = options.camera.fps;
   input.images = capture::openVideo(options.source, video);
   input.name = std::filesystem::path(options.source).filename().string();
@@ -108,10 +109,10 @@ void printStages(const pipeline::LiveReport& report) {
     const auto per_frame = [&](std::int64_t ns) { return ms(ns) / static_cast<double>(f.frames); };
     std::printf(
         "  detection: detector %.3f ms a frame (%llu searches, %llu checks), landmarks %.3f ms (%llu runs), "
-        "pupils %.3f ms; %llu doubts, %llu losses\n",
+        "pupils %.3f ms; of all that the networks themselves %.3f ms; %llu doubts, %llu losses\n",
         per_frame(f.detector_ns), static_cast<unsigned long long>(f.searches),
         static_cast<unsigned long long>(f.checks), per_frame(f.landmarks_ns),
-        static_cast<unsigned long long>(f.networks), per_frame(f.pupils_ns), static_cast<unsigned long long>(f.doubts),
+        static_cast<unsigned long long>(f.networks), per_frame(f.pupils_ns), per_frame(f.networks_ns), static_cast<unsigned long long>(f.doubts),
         static_cast<unsigned long long>(f.losses));
   }
 }
@@ -207,6 +208,7 @@ int run(const Options& options) {
   capture::setNetworkThreads(options.threads);
   pipeline::LiveInput input = openInput(options);
   live_options.every_frame = !input.live && !options.realtime;
+  if (!live_options.every_frame && options.threads == 0) capture::measureNetworkThreads();
   live_options.tracking.tracker.from_pixels = true;
   live_options.mesh = !options.no_mesh || !options.preview.empty() || !options.sheet.empty();
 
@@ -314,7 +316,8 @@ RunVerb defineRun(CLI::App& app) {
   app.add_option("--sheet", options->sheet, "at the end: moments of the performance, face beside avatar")
       ->type_name("F.png");
   app.add_flag("--no-mesh", options->no_mesh, "weights only: neither compute nor publish the deformed mesh");
-  app.add_option("--threads", options->threads, "of the networks (default 0: one per processor)")
+  app.add_option("--threads", options->threads, "of the networks (default 0: live one or one per processor, whichever is quicker at the time; else one per "
+                 "processor)")
       ->type_name("N")
       ->check(CLI::Range(0, 64));
   app.add_option("--wait", options->wait_s, "wait at most so long for a first subscriber (default 0: do not wait)")

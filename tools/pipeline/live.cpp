@@ -19,6 +19,9 @@ using namespace std::chrono_literals;
 
 constexpr std::int64_t kReportInterval_ns = 500'000'000;
 constexpr auto kPatience = 50ms;                   // how long a stage waits before it looks around
+// A file in real time: frames that may wait before a stage. A stall of a few of them is made up for within a second,
+// and a frame that is shown a little late bears its own time all the same. A camera's frames never wait.
+constexpr std::size_t kFileRoom = 6;
 constexpr std::int64_t kSilence_ns = 150'000'000;  // a source that says nothing for so long shows no face
 
 struct Captured {
@@ -73,11 +76,12 @@ struct Live::State {
         take(t),
         source_name(protocol::topicNameFrom(input.name)),
         path(rig, o.tracking, {.mesh = o.mesh, .weights = true}),
-        captured(policy()),
-        found(policy()),
-        shown(policy()) {}
+        captured(policy(), room()),
+        found(policy(), room()),
+        shown(policy(), room()) {}
 
   SlotPolicy policy() const { return options.every_frame ? SlotPolicy::every_frame : SlotPolicy::newest_wins; }
+  std::size_t room() const { return input.live || options.every_frame ? 1 : kFileRoom; }
 
   void capture();
   void captureDatagrams();

@@ -1,6 +1,8 @@
 #include "capture/detection/crop.h"
 
+#include <algorithm>
 #include <cmath>
+#include <random>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -108,6 +110,77 @@ TEST(SampleCrop, WhatIsMadeSmallerIsAveragedNotSkipped) {
   std::vector<float> planes(3 * 16 * 16);
   sampleCrop(image, crop, 16, 16, {}, false, planes);
   for (std::size_t i = 0; i < 256; ++i) EXPECT_NEAR(planes[i], 100, 1e-2);
+}
+
+// Each sample by itself, in double precision, as the header says it.
+std::vector<double> plainly(const Image& image, const ImageFromCrop& m, int width, int height, bool black_outside) {
+  const int n = std::clamp(static_cast<int>(std::lround(m.scale())), 1, 8);
+  const auto pixel = [&](int x, int y, int c) -> double {
+    const bool outside = x < 0 || y < 0 || x >= image.width || y >= image.height;
+    if (outside && black_outside) return 0;
+    x = std::clamp(x, 0, image.width - 1);
+    y = std::clamp(y, 0, image.height - 1);
+    return image.bgr[static_cast<std::size_t>(3 * (y * image.width + x) + c)];
+  };
+  std::vector<double> planes;
+  for (int c = 0; c < 3; ++c)
+    for (int row = 0; row < height; ++row)
+      for (int column = 0; column < width; ++column) {
+        double sum = 0;
+        for (int i = 0; i < n; ++i)
+          for (int j = 0; j < n; ++j) {
+            const double u = column + (j + 0.5) / n, v = row + (i + 0.5) / n;
+            const double x = m.a * u - m.b * v + m.tx, y = m.b * u + m.a * v + m.ty;
+            const int px = static_cast<int>(std::floor(n == 1 ? x - 0.5 : x));
+            const int py = static_cast<int>(std::floor(n == 1 ? y - 0.5 : y));
+            if (n > 1) {
+              sum += pixel(px, py, c);
+              continue;
+            }
+            const double fx = x - 0.5 - px, fy = y - 0.5 - py;
+            sum += (1 - fy) * ((1 - fx) * pixel(px, py, c) + fx * pixel(px + 1, py, c)) +
+                   fy * ((1 - fx) * pixel(px, py + 1, c) + fx * pixel(px + 1, py + 1, c));
+          }
+        planes.push_back(sum / (n * n));
+      }
+  return planes;
+}
+
+TEST(SampleCrop, EveryWayOfDoingItGivesWhatThePlainOneGives) {
+  std::mt19937 random(7);
+  Image image;
+  image.resize(200, 160);
+  // Smooth, so that a sample that falls on the other side of a pixel's border by rounding changes little.
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x)
+      for (int c = 0; c < 3; ++c)
+        image.bgr[static_cast<std::size_t>(3 * (y * image.width + x) + c)] =
+            static_cast<std::uint8_t>(128 + 60 * std::sin(0.05 * x + c) + 60 * std::cos(0.04 * y - c));
+  std::uniform_real_distribution<double> anywhere(-1, 1);
+  for (const int width : {3, 8, 20, 45}) {  // narrower than a vector; not a multiple of one
+    for (const double scale : {0.4, 1.0, 1.9, 3.2, 5.0, 9.0}) {
+      for (const double turn : {0.0, 0.4, -2.5}) {
+        for (const double apart : {0.0, 1.0}) {  // within the image where it fits; over its border
+          for (const bool black_outside : {false, true}) {
+            const int height = width + 2;
+            ImageFromCrop m;
+            m.a = scale * std::cos(turn);
+            m.b = scale * std::sin(turn);
+            m.tx = 100 - 0.5 * (m.a * width - m.b * height) + apart * 90 * anywhere(random);
+            m.ty = 80 - 0.5 * (m.b * width + m.a * height) + apart * 70 * anywhere(random);
+            std::vector<float> planes(static_cast<std::size_t>(3 * width * height));
+            sampleCrop(image, m, width, height, {}, black_outside, planes);
+            const std::vector<double> expected = plainly(image, m, width, height, black_outside);
+            int different = 0;
+            for (std::size_t i = 0; i < planes.size(); ++i) different += std::abs(planes[i] - expected[i]) > 3 ? 1 : 0;
+            // At a black border rounding decides between a pixel and nothing.
+            EXPECT_LE(different, black_outside ? static_cast<int>(planes.size()) / 50 : 0)
+                << width << " wide, scale " << scale << ", turned by " << turn << ", moved " << apart;
+          }
+        }
+      }
+    }
+  }
 }
 
 TEST(Anchors, EveryLayoutHasThem) {

@@ -1,0 +1,29 @@
+// The inner loop of sampleCrop() for a crop that lies well within its image, eight pixels at a time.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "capture/detection/crop.h"
+
+namespace volto::capture {
+
+// Pixel positions are fixed point with so many bits behind the point.
+inline constexpr int kFixedBits = 16;
+
+struct CropSamples {
+  const Image* image;
+  ImageFromCrop image_from_crop;
+  int width, height;  // of the crop
+  int taps;           // 1: one sample between four pixels; n: n x n pixels, averaged
+  // Blue, green, red of the image: where they go, and what a sum of all samples is multiplied with and added to it.
+  std::array<float*, 3> planes;
+  std::array<float, 3> factor, offset;
+};
+
+// Every sample must lie two pixels and more from the image's border. False when this processor has no instructions for
+// it, or the crop is too narrow: nothing has been done then.
+bool sampleInside(const CropSamples& crop);
+
+}  // namespace volto::capture
