@@ -39,6 +39,7 @@ Axes axesOf(const FaceAnchors& p) {
 
 constexpr double kOne = 1 << kFixedBits;
 constexpr int kMostTaps = 8;
+constexpr double kHalveFrom = 2.5;  // pixels of the image per pixel of the crop
 
 // Largest integer below; std::floor is a call where the processor is not known to have SSE 4.1.
 std::int64_t floorOf(double x) {
@@ -99,6 +100,37 @@ bool liesInside(const Image& image, const ImageFromCrop& image_from_crop, int wi
     const auto within = [](float v, int size) { return v >= 2 && v <= static_cast<float>(size - 3); };
     if (!within(at[0], image.width) || !within(at[1], image.height)) return false;
   }
+  return true;
+}
+
+// The part of an image that a crop covers, and a little around it, at half the size; half of that again, and so on.
+// Where a face is large that is much less to look at than every pixel by itself. False when nothing is left of it.
+bool halve(const Image& image, const ImageFromCrop& image_from_crop, int width, int height, Image& out,
+           ImageFromCrop& out_from_crop) {
+  double low_x = image.width, low_y = image.height, high_x = 0, high_y = 0;
+  for (const auto& [x, y] : {std::pair{0, 0}, {width, 0}, {0, height}, {width, height}}) {
+    const auto at = image_from_crop(x, y);
+    low_x = std::min<double>(low_x, at[0]);
+    low_y = std::min<double>(low_y, at[1]);
+    high_x = std::max<double>(high_x, at[0]);
+    high_y = std::max<double>(high_y, at[1]);
+  }
+  constexpr double kAround = 8;  // more than a sample reaches, twice as large
+  const int left = static_cast<int>(std::clamp(low_x - kAround, 0.0, static_cast<double>(image.width)));
+  const int top = static_cast<int>(std::clamp(low_y - kAround, 0.0, static_cast<double>(image.height)));
+  const int right = static_cast<int>(std::clamp(high_x + kAround, 0.0, static_cast<double>(image.width)));
+  const int bottom = static_cast<int>(std::clamp(high_y + kAround, 0.0, static_cast<double>(image.height)));
+  if (right - left < 2 || bottom - top < 2) return false;
+  out.resize((right - left) / 2, (bottom - top) / 2);
+  const std::size_t row_bytes = 3 * static_cast<std::size_t>(image.width);
+  for (int y = 0; y < out.height; ++y) {
+    const std::uint8_t* const above =
+        image.bgr.data() + static_cast<std::size_t>(top + 2 * y) * row_bytes + 3 * static_cast<std::size_t>(left);
+    halveRows(above, above + row_bytes, out.width,
+              out.bgr.data() + 3 * static_cast<std::size_t>(y) * static_cast<std::size_t>(out.width));
+  }
+  out_from_crop = {0.5 * image_from_crop.a, 0.5 * image_from_crop.b, 0.5 * (image_from_crop.tx - left),
+                   0.5 * (image_from_crop.ty - top)};
   return true;
 }
 
@@ -164,53 +196,9 @@ class UprightAverage {
   std::vector<std::uint16_t> sums_;  // of the rows, three colours each, from column first_ on
 };
 
-}  // namespace
-
-double ImageFromCrop::scale() const { return std::hypot(a, b); }
-
-std::array<float, 2> ImageFromCrop::inverse(double x, double y) const {
-  const double square = a * a + b * b;
-  const double dx = x - tx, dy = y - ty;
-  return {static_cast<float>((a * dx + b * dy) / square), static_cast<float>((a * dy - b * dx) / square)};
-}
-
-FaceAnchors anchorsOf(LandmarkLayout layout, std::span<const std::array<float, 2>> points) {
-  switch (layout) {
-    case LandmarkLayout::ibug68:
-      return {meanOf(points, {36, 37, 38, 39, 40, 41}), meanOf(points, {42, 43, 44, 45, 46, 47}), points[30],
-              points[48], points[54]};
-    case LandmarkLayout::openseeface66:
-      return {meanOf(points, {36, 37, 38, 39, 40, 41}), meanOf(points, {42, 43, 44, 45, 46, 47}), points[30],
-              points[58], points[62]};
-    case LandmarkLayout::mediapipe478:
-      return {meanOf(points, {33, 133, 159, 145}), meanOf(points, {362, 263, 386, 374}), points[4], points[61],
-              points[291]};
-  }
-  throw std::invalid_argument("unknown landmark layout");
-}
-
-bool cropOf(const FaceAnchors& in_image, const FaceAnchors& in_model, int width, int height, ImageFromCrop& out) {
-  const Axes face = axesOf(in_image);
-  const Axes model = axesOf(in_model);
-  // Upright: the eyes' line and the line down to the mouth, turned by a quarter, agree as far as they are long.
-  const double right_x = face.across_x + face.down_y, right_y = face.across_y - face.down_x;
-  const double length = std::hypot(right_x, right_y);
-  const double wide = std::hypot(face.across_x, face.across_y) / (std::hypot(model.across_x, model.across_y) * width);
-  const double high = std::hypot(face.down_x, face.down_y) / (std::hypot(model.down_x, model.down_y) * height);
-  const double scale = std::max(wide, high);  // pixels of the image per pixel of the crop
-  if (!(length > 1e-3) || !(scale > 1e-3 && scale < 1e3)) return false;
-  out.a = scale * right_x / length;
-  out.b = scale * right_y / length;
-  const double x = model.x * width, y = model.y * height;
-  out.tx = face.x - (out.a * x - out.b * y);
-  out.ty = face.y - (out.b * x + out.a * y);
-  return std::isfinite(out.tx) && std::isfinite(out.ty);
-}
-
-void sampleCrop(const Image& image, const ImageFromCrop& image_from_crop, int width, int height,
-                const Normalisation& normalisation, bool black_outside, std::span<float> planes) {
+void sampleAll(const Image& image, const ImageFromCrop& image_from_crop, int width, int height,
+               const Normalisation& normalisation, bool black_outside, std::span<float> planes) {
   const std::size_t plane = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  if (planes.size() < 3 * plane) throw std::invalid_argument("too little room for a crop");
   // n x n samples a pixel; pixel centres lie at half.
   const int n = std::clamp(static_cast<int>(std::lround(image_from_crop.scale())), 1, kMostTaps);
   const float share = 1.0F / static_cast<float>(n * n);
@@ -260,6 +248,64 @@ void sampleCrop(const Image& image, const ImageFromCrop& image_from_crop, int wi
       put(at, sum[0], sum[1], sum[2]);
     }
   }
+}
+
+}  // namespace
+
+double ImageFromCrop::scale() const { return std::hypot(a, b); }
+
+std::array<float, 2> ImageFromCrop::inverse(double x, double y) const {
+  const double square = a * a + b * b;
+  const double dx = x - tx, dy = y - ty;
+  return {static_cast<float>((a * dx + b * dy) / square), static_cast<float>((a * dy - b * dx) / square)};
+}
+
+FaceAnchors anchorsOf(LandmarkLayout layout, std::span<const std::array<float, 2>> points) {
+  switch (layout) {
+    case LandmarkLayout::ibug68:
+      return {meanOf(points, {36, 37, 38, 39, 40, 41}), meanOf(points, {42, 43, 44, 45, 46, 47}), points[30],
+              points[48], points[54]};
+    case LandmarkLayout::openseeface66:
+      return {meanOf(points, {36, 37, 38, 39, 40, 41}), meanOf(points, {42, 43, 44, 45, 46, 47}), points[30],
+              points[58], points[62]};
+    case LandmarkLayout::mediapipe478:
+      return {meanOf(points, {33, 133, 159, 145}), meanOf(points, {362, 263, 386, 374}), points[4], points[61],
+              points[291]};
+  }
+  throw std::invalid_argument("unknown landmark layout");
+}
+
+bool cropOf(const FaceAnchors& in_image, const FaceAnchors& in_model, int width, int height, ImageFromCrop& out) {
+  const Axes face = axesOf(in_image);
+  const Axes model = axesOf(in_model);
+  // Upright: the eyes' line and the line down to the mouth, turned by a quarter, agree as far as they are long.
+  const double right_x = face.across_x + face.down_y, right_y = face.across_y - face.down_x;
+  const double length = std::hypot(right_x, right_y);
+  const double wide = std::hypot(face.across_x, face.across_y) / (std::hypot(model.across_x, model.across_y) * width);
+  const double high = std::hypot(face.down_x, face.down_y) / (std::hypot(model.down_x, model.down_y) * height);
+  const double scale = std::max(wide, high);  // pixels of the image per pixel of the crop
+  if (!(length > 1e-3) || !(scale > 1e-3 && scale < 1e3)) return false;
+  out.a = scale * right_x / length;
+  out.b = scale * right_y / length;
+  const double x = model.x * width, y = model.y * height;
+  out.tx = face.x - (out.a * x - out.b * y);
+  out.ty = face.y - (out.b * x + out.a * y);
+  return std::isfinite(out.tx) && std::isfinite(out.ty);
+}
+
+void sampleCrop(const Image& image, const ImageFromCrop& image_from_crop, int width, int height,
+                const Normalisation& normalisation, bool black_outside, std::span<float> planes) {
+  if (planes.size() < 3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height))
+    throw std::invalid_argument("too little room for a crop");
+  thread_local std::array<Image, 2> halved;  // they keep their memory
+  const Image* from = &image;
+  ImageFromCrop from_crop = image_from_crop, next;
+  for (std::size_t i = 0; !black_outside && from_crop.scale() >= kHalveFrom; ++i) {
+    if (!halve(*from, from_crop, width, height, halved[i % 2], next)) break;
+    from = &halved[i % 2];
+    from_crop = next;
+  }
+  sampleAll(*from, from_crop, width, height, normalisation, black_outside, planes);
 }
 
 }  // namespace volto::capture

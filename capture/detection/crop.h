@@ -37,7 +37,8 @@ struct Normalisation {
 };
 
 // Fills 3 planes of height x width. What is larger in the image than in the crop is averaged, not skipped. Outside the
-// image: its border, or black.
+// image: its border, or black. (Where the border counts, a crop more than 2.5 times as small as what it shows is taken
+// from the image at half its size, a quarter, ...: rounded to whole levels each time.)
 void sampleCrop(const Image& image, const ImageFromCrop& image_from_crop, int width, int height,
                 const Normalisation& normalisation, bool black_outside, std::span<float> planes);
 

@@ -15,6 +15,7 @@ namespace HWY_NAMESPACE {
 
 #if HWY_TARGET == HWY_SCALAR
 bool sampleInsideHere(const CropSamples&) { return false; }
+int halveRowsHere(const std::uint8_t*, const std::uint8_t*, int, std::uint8_t*) { return 0; }
 #else
 
 namespace hn = hwy::HWY_NAMESPACE;
@@ -144,6 +145,30 @@ bool sampleInsideHere(const CropSamples& crop) {
   return true;
 }
 
+// How many of them it has made.
+int halveRowsHere(const std::uint8_t* above, const std::uint8_t* below, int width, std::uint8_t* out) {
+  using Bytes = hn::FixedTag<std::uint8_t, 16>;
+  using Words = hn::Repartition<std::uint16_t, Bytes>;
+  using Halves = hn::FixedTag<std::uint8_t, 8>;
+  const Words words;
+  const auto low = hn::Set(words, 0xFF), two = hn::Set(words, 2);
+  const auto mean = [&](auto a, auto b) HWY_ATTR {
+    const auto u = hn::BitCast(words, a), v = hn::BitCast(words, b);
+    const auto sum =
+        hn::Add(hn::Add(hn::And(u, low), hn::ShiftRight<8>(u)), hn::Add(hn::And(v, low), hn::ShiftRight<8>(v)));
+    const auto rounded = hn::ShiftRight<2>(hn::Add(sum, two));
+    return hn::DemoteTo(Halves(), hn::BitCast(hn::RebindToSigned<Words>(), rounded));
+  };
+  int x = 0;
+  for (; x + 8 <= width; x += 8) {
+    hn::Vec<Bytes> b0, g0, r0, b1, g1, r1;
+    hn::LoadInterleaved3(Bytes(), above + 6 * static_cast<std::size_t>(x), b0, g0, r0);
+    hn::LoadInterleaved3(Bytes(), below + 6 * static_cast<std::size_t>(x), b1, g1, r1);
+    hn::StoreInterleaved3(mean(b0, b1), mean(g0, g1), mean(r0, r1), Halves(), out + 3 * static_cast<std::size_t>(x));
+  }
+  return x;
+}
+
 #endif
 
 }  // namespace HWY_NAMESPACE
@@ -154,8 +179,17 @@ HWY_AFTER_NAMESPACE();
 namespace volto::capture {
 
 HWY_EXPORT(sampleInsideHere);
+HWY_EXPORT(halveRowsHere);
 
 bool sampleInside(const CropSamples& crop) { return HWY_DYNAMIC_DISPATCH(sampleInsideHere)(crop); }
+
+void halveRows(const std::uint8_t* above, const std::uint8_t* below, int width, std::uint8_t* out) {
+  const int done = HWY_DYNAMIC_DISPATCH(halveRowsHere)(above, below, width, out);
+  for (std::size_t i = 3 * static_cast<std::size_t>(done); i < 3 * static_cast<std::size_t>(width); ++i) {
+    const std::size_t at = i / 3 * 6 + i % 3;
+    out[i] = static_cast<std::uint8_t>((above[at] + above[at + 3] + below[at] + below[at + 3] + 2) / 4);
+  }
+}
 
 }  // namespace volto::capture
 #endif  // HWY_ONCE

@@ -1,4 +1,4 @@
-// The inner loop of sampleCrop() for a crop that lies well within its image, eight pixels at a time.
+// The inner loops of sampleCrop(), eight pixels at a time.
 #pragma once
 
 #include <array>
@@ -25,5 +25,8 @@ struct CropSamples {
 // Every sample must lie two pixels and more from the image's border. False when this processor has no instructions for
 // it, or the crop is too narrow: nothing has been done then.
 bool sampleInside(const CropSamples& crop);
+
+// Means of 2 x 2 pixels, rounded: `width` of them from two rows of an image that lie below each other.
+void halveRows(const std::uint8_t* above, const std::uint8_t* below, int width, std::uint8_t* out);
 
 }  // namespace volto::capture

@@ -40,6 +40,11 @@ class FlushToZero {
 
 std::atomic<bool> threads_are_measured{false};
 
+// OpenCV makes its threads anew even when their number stays.
+void useThreads(int threads) {
+  if (cv::getNumThreads() != threads) cv::setNumThreads(threads);
+}
+
 std::int64_t nowNs() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
       .count();
@@ -71,7 +76,7 @@ struct Network::State {
     const bool measured = threads_are_measured;
     if (measured) {
       if (!threads) threads.emplace(cv::getNumberOfCPUs());
-      cv::setNumThreads(threads->threads());  // of the process, not of this network; takes a microsecond
+      useThreads(threads->threads());  // of the process, not of this network; takes a microsecond
     }
     const std::int64_t before = nowNs();
     net.setInput(input);
@@ -148,7 +153,7 @@ std::int64_t Network::spent_ns() const { return state_->spent_ns; }
 
 void setNetworkThreads(int threads) {
   threads_are_measured = false;
-  cv::setNumThreads(threads > 0 ? threads : cv::getNumberOfCPUs());
+  useThreads(threads > 0 ? threads : cv::getNumberOfCPUs());
 }
 
 void measureNetworkThreads() { threads_are_measured = true; }

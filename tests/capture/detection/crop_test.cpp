@@ -83,8 +83,10 @@ TEST(SampleCrop, ARampStaysARampAtEveryScale) {
     sampleCrop(image, crop, kSide, kSide, {}, false, planes);
     for (const int at : {0, 5, 15}) {
       const double expected = 100 + scale * (at + 0.5) - 0.5;  // pixel centres lie at half
-      EXPECT_NEAR(planes[static_cast<std::size_t>(3 * kSide + at)], expected, 0.51) << "x at scale " << scale;
-      EXPECT_NEAR(planes[static_cast<std::size_t>(kSide * kSide + kSide * at + 3)], expected, 0.51)
+      // What is much smaller than in the image is halved first, and rounded to whole levels each time.
+      const double rounding = 0.51 + (scale < 2.5 ? 0 : scale < 5 ? 0.5 : 1);
+      EXPECT_NEAR(planes[static_cast<std::size_t>(3 * kSide + at)], expected, rounding) << "x at scale " << scale;
+      EXPECT_NEAR(planes[static_cast<std::size_t>(kSide * kSide + kSide * at + 3)], expected, rounding)
           << "y at scale " << scale;
     }
   }
@@ -150,15 +152,16 @@ TEST(SampleCrop, EveryWayOfDoingItGivesWhatThePlainOneGives) {
   std::mt19937 random(7);
   Image image;
   image.resize(200, 160);
-  // Smooth, so that a sample that falls on the other side of a pixel's border by rounding changes little.
-  for (int y = 0; y < image.height; ++y)
-    for (int x = 0; x < image.width; ++x)
-      for (int c = 0; c < 3; ++c)
-        image.bgr[static_cast<std::size_t>(3 * (y * image.width + x) + c)] =
-            static_cast<std::uint8_t>(128 + 60 * std::sin(0.05 * x + c) + 60 * std::cos(0.04 * y - c));
   std::uniform_real_distribution<double> anywhere(-1, 1);
   for (const int width : {3, 8, 20, 45}) {  // narrower than a vector; not a multiple of one
-    for (const double scale : {0.4, 1.0, 1.9, 3.2, 5.0, 9.0}) {
+    for (const double scale : {0.4, 1.0, 1.9, 2.7, 3.2, 5.0, 9.0}) {
+      // Smooth, six levels from one pixel of the crop to the next: a sample lies at most a quarter of one beside its
+      // place.
+      for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x)
+          for (int c = 0; c < 3; ++c)
+            image.bgr[static_cast<std::size_t>(3 * (y * image.width + x) + c)] = static_cast<std::uint8_t>(
+                128 + 60 * std::sin(0.1 / scale * x + c) + 60 * std::cos(0.1 / scale * y - c));
       for (const double turn : {0.0, 0.4, -2.5}) {
         for (const double apart : {0.0, 1.0}) {  // within the image where it fits; over its border
           for (const bool black_outside : {false, true}) {
@@ -171,8 +174,11 @@ TEST(SampleCrop, EveryWayOfDoingItGivesWhatThePlainOneGives) {
             std::vector<float> planes(static_cast<std::size_t>(3 * width * height));
             sampleCrop(image, m, width, height, {}, black_outside, planes);
             const std::vector<double> expected = plainly(image, m, width, height, black_outside);
+            // Beyond the border lies the mean of the last few pixels where the image was halved.
+            const double tolerance = apart > 0 && scale >= 2.5 && !black_outside ? 8 : 3.5;
             int different = 0;
-            for (std::size_t i = 0; i < planes.size(); ++i) different += std::abs(planes[i] - expected[i]) > 3 ? 1 : 0;
+            for (std::size_t i = 0; i < planes.size(); ++i)
+              different += std::abs(planes[i] - expected[i]) > tolerance ? 1 : 0;
             // At a black border rounding decides between a pixel and nothing.
             EXPECT_LE(different, black_outside ? static_cast<int>(planes.size()) / 50 : 0)
                 << width << " wide, scale " << scale << ", turned by " << turn << ", moved " << apart;
