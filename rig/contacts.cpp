@@ -148,12 +148,13 @@ void unfold(const Contacts& contacts, std::span<Vec3> positions) {
   std::array<TouchedVertices, 2> touched;
   touched[0].addAll();
   for (int round = 1; round < kMostRounds; ++round) {
-    TouchedVertices &before = touched[static_cast<std::size_t>(round + 1) % 2],
+    TouchedVertices &reach = touched[static_cast<std::size_t>(round + 1) % 2],
                     &now = touched[static_cast<std::size_t>(round) % 2];
     now.clear();
     if (round % kBallsEvery == 0)
       for (const BallContact& ball : contacts.balls) keepOnBall(ball, false, positions, &now);
-    if (unfoldAround(contacts.folds, before, now, positions) == 0) return;
+    reach.addAll(now);
+    if (unfoldAround(contacts.folds, reach, now, positions) == 0) return;
   }
 }
 

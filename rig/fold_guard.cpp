@@ -70,17 +70,18 @@ std::size_t unfoldOnce(const FoldGuard& guard, std::size_t count, std::span<Vec3
   return lacking;
 }
 
-std::size_t unfoldAround(const FoldGuard& guard, const TouchedVertices& before, TouchedVertices& now,
+std::size_t unfoldAround(const FoldGuard& guard, TouchedVertices& reach, TouchedVertices& now,
                          std::span<Vec3> positions) {
   std::size_t lacking = 0;
-  const auto touched = [&](std::uint32_t v) { return before.has(v) || now.has(v); };
   for (std::size_t i = 0; i < guard.triangle.size(); ++i) {
-    const auto& [a, b, c] = guard.triangle[i];
-    if (!touched(a) && !touched(b) && !touched(c)) continue;
+    if (!reach.hasAny(guard.triangle[i])) continue;
     bool moved = false;
     lacking += bringBack(guard, i, positions, moved) ? 1 : 0;
     if (!moved) continue;
-    for (const std::uint32_t v : guard.triangle[i]) now.add(v);
+    for (const std::uint32_t v : guard.triangle[i]) {
+      reach.add(v);
+      now.add(v);
+    }
   }
   if (lacking > 0) moveCopies(guard, positions);
   return lacking;

@@ -16,16 +16,21 @@ class TouchedVertices {
   void addAll() { bits_.fill(~std::uint64_t{0}); }
   void clear() { bits_.fill(0); }
   void add(std::uint32_t v) { bits_[(v >> 6U) % kWords] |= std::uint64_t{1} << (v & 63U); }
-  bool has(std::uint32_t v) const { return (bits_[(v >> 6U) % kWords] >> (v & 63U) & 1U) != 0; }
+  bool has(std::uint32_t v) const { return bit(v) != 0; }
+  bool hasAny(const std::array<std::uint32_t, 3>& v) const { return (bit(v[0]) | bit(v[1]) | bit(v[2])) != 0; }
+  void addAll(const TouchedVertices& other) {
+    for (std::size_t i = 0; i < kWords; ++i) bits_[i] |= other.bits_[i];
+  }
 
  private:
+  std::uint64_t bit(std::uint32_t v) const { return bits_[(v >> 6U) % kWords] >> (v & 63U) & 1U; }
   static constexpr std::size_t kWords = 256;
   std::array<std::uint64_t, kWords> bits_{};
 };
 
-// One round over the triangles with a vertex in `before` or moved in this round, which `now` gains. Returns how many
-// lacked something.
-std::size_t unfoldAround(const FoldGuard& guard, const TouchedVertices& before, TouchedVertices& now,
+// One round over the triangles with a vertex in `reach`: what the round before has moved, to which come those moved in
+// this one. `now` gains these too. Returns how many lacked something.
+std::size_t unfoldAround(const FoldGuard& guard, TouchedVertices& reach, TouchedVertices& now,
                          std::span<std::array<float, 3>> positions);
 
 }  // namespace volto::rig

@@ -128,7 +128,7 @@ struct Tracker::State {
   }
 
   bool track(double dt_s);
-  void learn(double time_s, double dt_s);
+  void learn();
   void adoptEstimate();
   void measure(const LandmarkFrame& in, double dt_s, MaskFrame& out);
   void lose(double dt_s, MaskFrame& out);
@@ -151,6 +151,7 @@ struct Tracker::State {
   bool tracking = false;
   bool started = false;
   std::int64_t last_ns = 0;
+  std::optional<double> to_learn_dt_s;  // the last frame still has to be learned from; its distance to the one before
   ViewPose pose;
   ShapeVector weights = ShapeVector::Zero();
   WeightPrior prior;
@@ -203,7 +204,10 @@ bool Tracker::State::track(double dt_s) {
   return good && p.fit.rms_mm() < kNoFace_mm;
 }
 
-void Tracker::State::learn(double time_s, double dt_s) {
+void Tracker::State::learn() {
+  if (!to_learn_dt_s) return;
+  const double time_s = static_cast<double>(last_ns) * 1e-9, dt_s = *to_learn_dt_s;
+  to_learn_dt_s.reset();
   Parts& p = *parts;
   if (p.estimator.wants(time_s)) p.estimator.add(p.seen, pose, time_s);
   const int pieces =
@@ -342,12 +346,14 @@ Tracker& Tracker::operator=(Tracker&&) noexcept = default;
 
 void Tracker::setNeutral(const NeutralFace& neutral) {
   deviationOf(neutral, state_->parts->shape, state_->parts->points);  // throws before anything changes
+  state_->learn();
   state_->fixed = neutral;
   state_->fixNeutral(neutral);
   for (std::size_t eye = 0; eye < 2; ++eye) state_->lids[eye].start(neutral.lids[eye]);
 }
 
 NeutralFace Tracker::neutral() const {
+  state_->learn();
   const State& s = *state_;
   NeutralFace face = makeNeutralFace(s.parts->shape, s.parts->points, s.parts->target, s.parts->observer.scale());
   if (s.parts->estimator.hasResult()) {
@@ -362,8 +368,11 @@ NeutralFace Tracker::neutral() const {
   return face;
 }
 
+void Tracker::learn() { state_->learn(); }
+
 void Tracker::push(const LandmarkFrame& in, MaskFrame& out) {
   State& s = *state_;
+  s.learn();
   if (in.layout != s.parts->layout) s.build(in.layout);
   out.t_capture_ns = in.t_capture_ns;
   out.capture_seq = in.capture_seq;
@@ -394,7 +403,7 @@ void Tracker::push(const LandmarkFrame& in, MaskFrame& out) {
     s.lost_s = 0;
     s.measure(in, dt_s, out);
     s.blendIn(dt_s, out);
-    s.learn(static_cast<double>(in.t_capture_ns) * 1e-9, dt_s);
+    s.to_learn_dt_s = dt_s;
     s.last_good = out;
     s.ever_shown = true;
   } else {

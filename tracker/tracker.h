@@ -79,6 +79,10 @@ class Tracker {
   // std::invalid_argument for a layout that the tracker does not know (tracker/landmark_layout.h).
   void push(const LandmarkFrame& in, MaskFrame& out);
 
+  // What the last frame teaches about this actor's neutral (a good half of the work) is left for after it: call this
+  // once the frame is on its way. The next push() does it first where nobody has, so the output is the same either way.
+  void learn();
+
  private:
   struct State;
   std::unique_ptr<State> state_;

@@ -38,6 +38,7 @@ class Tracking {
   // Forgets what was seen: the next frame is the first.
   void restart();
   // From now on this is the actor's face at rest; and what is known of it so far.
+  void learn() { tracker_.learn(); }
   void setNeutral(const tracker::NeutralFace& neutral) { tracker_.setNeutral(neutral); }
   tracker::NeutralFace neutral() const { return tracker_.neutral(); }
 
@@ -58,6 +59,8 @@ class FramePath {
   void push(const LandmarkFrame& in);
   void push(const Performance& performance, std::size_t frame);
   void restart();
+  // What the last frame teaches, done now and not before the next one; see tracker/tracker.h.
+  void learn() { tracking_.learn(); }
   void setNeutral(const tracker::NeutralFace& neutral) { tracking_.setNeutral(neutral); }
   tracker::NeutralFace neutral() const { return tracking_.neutral(); }
 

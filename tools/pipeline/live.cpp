@@ -130,7 +130,7 @@ struct Live::State {
   std::vector<std::thread> threads;
   std::int64_t start_ns = 0;
 
-  Meter capture_meter, detection_meter, tracker_meter, retarget_meter, publish_meter, whole_meter;
+  Meter capture_meter, detection_meter, tracker_meter, retarget_meter, learning_meter, publish_meter, whole_meter;
 
   // The tracker thread's own.
   std::vector<LandmarkFrame> rest;
@@ -301,6 +301,9 @@ void Live::State::track() {
     out.t_shown_ns = in.t_shown_ns;
     out.arrived_ns = in.arrived_ns;
     if (!shown.put(out)) break;
+    const std::int64_t gone = monotonicNow();
+    path.learn();
+    learning_meter.add(monotonicNow() - gone);
   }
   if (faces > 0) {
     const std::lock_guard lock(mutex);
@@ -355,6 +358,7 @@ LiveReport Live::State::makeReport() const {
   if (input.images) add("detection", detection_meter, captured.replaced(), captured.waiting());
   add("tracker", tracker_meter, found.replaced(), found.waiting());
   add("retarget", retarget_meter, 0, 0);
+  add("learning", learning_meter, 0, 0);
   add("publish", publish_meter, shown.replaced(), shown.waiting());
   add("arrival to sent", whole_meter, 0, 0);
   out.source = source;

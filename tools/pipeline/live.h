@@ -62,7 +62,9 @@ struct StageReport {
 };
 
 struct LiveReport {
-  std::vector<StageReport> stages;  // capture, detection, tracker, retarget, publish, and capture to sent as a whole
+  // capture, detection, tracker, retarget, learning (the tracker's, when the frame has gone on already), publish, and
+  // capture to sent as a whole
+  std::vector<StageReport> stages;
   capture::SourceCounters source;
   capture::SourceState source_state = capture::SourceState::no_signal;
   capture::SourceInfo source_info;
