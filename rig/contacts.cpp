@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "rig/unfold_rounds.h"
 
@@ -147,6 +148,7 @@ void unfold(const Contacts& contacts, std::span<Vec3> positions) {
   if (contacts.folds.empty() || unfoldOnce(contacts.folds, contacts.folds.watched, positions) == 0) return;
   std::array<TouchedVertices, 2> touched;
   touched[0].addAll();
+  std::optional<TriangleBlocks> blocks;
   for (int round = 1; round < kMostRounds; ++round) {
     TouchedVertices &reach = touched[static_cast<std::size_t>(round + 1) % 2],
                     &now = touched[static_cast<std::size_t>(round) % 2];
@@ -154,7 +156,8 @@ void unfold(const Contacts& contacts, std::span<Vec3> positions) {
     if (round % kBallsEvery == 0)
       for (const BallContact& ball : contacts.balls) keepOnBall(ball, false, positions, &now);
     reach.addAll(now);
-    if (unfoldAround(contacts.folds, reach, now, positions) == 0) return;
+    if (unfoldAround(contacts.folds, blocks ? &*blocks : nullptr, reach, now, positions) == 0) return;
+    if (!blocks) blocks.emplace(contacts.folds);
   }
 }
 

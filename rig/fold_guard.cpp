@@ -13,10 +13,10 @@
 namespace volto::rig {
 namespace {
 
-constexpr float kGiven = 3;           // of `least`, to a triangle that has less than it
-constexpr float kLeast = 0.01F;       // of its area at rest
-constexpr float kWatched = 0.5F;      // a triangle that some expression brings below this share of its area
-constexpr float kLeastArea = 1e-9F;   // in squares of the eye separation: what is smaller at rest has no direction
+constexpr float kGiven = 3;          // of `least`, to a triangle that has less than it
+constexpr float kLeast = 0.01F;      // of its area at rest
+constexpr float kWatched = 0.5F;     // a triangle that some expression brings below this share of its area
+constexpr float kLeastArea = 1e-9F;  // in squares of the eye separation: what is smaller at rest has no direction
 
 using Vec3 = std::array<float, 3>;
 
@@ -70,17 +70,29 @@ std::size_t unfoldOnce(const FoldGuard& guard, std::size_t count, std::span<Vec3
   return lacking;
 }
 
-std::size_t unfoldAround(const FoldGuard& guard, TouchedVertices& reach, TouchedVertices& now,
-                         std::span<Vec3> positions) {
+TriangleBlocks::TriangleBlocks(const FoldGuard& guard)
+    : size_(std::max<std::size_t>(8, (guard.triangle.size() + kMostBlocks - 1) / kMostBlocks)) {
+  for (std::size_t i = 0; i < guard.triangle.size(); ++i)
+    for (const std::uint32_t v : guard.triangle[i]) groups_[i / size_] |= TouchedVertices::groupOf(v);
+}
+
+std::size_t unfoldAround(const FoldGuard& guard, const TriangleBlocks* blocks, TouchedVertices& reach,
+                         TouchedVertices& now, std::span<Vec3> positions) {
   std::size_t lacking = 0;
-  for (std::size_t i = 0; i < guard.triangle.size(); ++i) {
-    if (!reach.hasAny(guard.triangle[i])) continue;
-    bool moved = false;
-    lacking += bringBack(guard, i, positions, moved) ? 1 : 0;
-    if (!moved) continue;
-    for (const std::uint32_t v : guard.triangle[i]) {
-      reach.add(v);
-      now.add(v);
+  const std::size_t count = guard.triangle.size(), size = blocks != nullptr ? blocks->size() : count;
+  for (std::size_t first = 0, block = 0; first < count; first += size, ++block) {
+    // Where no triangle is reached, none is moved that could reach another one of the block.
+    if (blocks != nullptr && (blocks->groups(block) & reach.groups()) == 0) continue;
+    const std::size_t end = std::min(first + size, count);
+    for (std::size_t i = first; i < end; ++i) {
+      if (!reach.hasAny(guard.triangle[i])) continue;
+      bool moved = false;
+      lacking += bringBack(guard, i, positions, moved) ? 1 : 0;
+      if (!moved) continue;
+      for (const std::uint32_t v : guard.triangle[i]) {
+        reach.add(v);
+        now.add(v);
+      }
     }
   }
   if (lacking > 0) moveCopies(guard, positions);

@@ -1,7 +1,10 @@
 #include "capture/detection/pupils.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <vector>
 
 #include "capture/detection/crop.h"
 
@@ -17,6 +20,29 @@ constexpr double kLeastOpening = 0.12, kFullOpening = 0.25;  // height of the op
 constexpr double kSmallestEye_px = 7;
 constexpr float kLeastContrast = 8, kFullContrast = 40;  // grey levels between iris and what surrounds it
 constexpr float kLidDarkness = 0.25F;                    // how much of the disc must be open to count
+
+// Where a pupil's middle is looked for. A ring around each of these places stays between the patch's sides.
+constexpr int kLowX = static_cast<int>(0.5 * (kWidth - 0.8 * kEye)), kHighX = kWidth - kLowX;
+constexpr int kLowY = static_cast<int>(0.5 * (kHeight - 0.6 * kEye)), kHighY = kHeight - kLowY;
+constexpr std::size_t kPlaces = kHighX - kLowX + 1;
+static_assert(kLowX >= static_cast<int>(kRingRadius) && kHighX + static_cast<int>(kRingRadius) < kWidth);
+
+// Sums over a disc around each place of one row, from sums along rows (see PupilFinder::findOne).
+struct PlacesInARow {
+  std::array<float, kPlaces> seen{}, bright{};
+};
+
+void addPlaces(const std::vector<float>& seen, const std::vector<float>& bright, int cy,
+               const std::vector<int>& half_widths, PlacesInARow& out) {
+  const int reach = static_cast<int>(half_widths.size()) / 2;
+  for (int y = std::max(cy - reach, 0); y <= std::min(cy + reach, kHeight - 1); ++y) {
+    const int half = half_widths[static_cast<std::size_t>(y - cy + reach)];
+    const auto first = static_cast<std::size_t>(y * (kWidth + 1) + kLowX - half);
+    const auto end = static_cast<std::size_t>(y * (kWidth + 1) + kLowX + half + 1);
+    for (std::size_t i = 0; i < kPlaces; ++i) out.seen[i] += seen[end + i] - seen[first + i];
+    for (std::size_t i = 0; i < kPlaces; ++i) out.bright[i] += bright[end + i] - bright[first + i];
+  }
+}
 
 struct Column {
   float top = 1e9F, bottom = -1e9F;
@@ -125,24 +151,29 @@ Pupil PupilFinder::findOne(const Image& image, std::span<const std::array<float,
     }
     return sum;
   };
-  const auto contrastAt = [&](int cx, int cy) {
-    const Sum inside = sumOver(cx, cy, disc_), all = sumOver(cx, cy, ring_);
+  const auto contrastOf = [&](const Sum& inside, const Sum& all) {
     const Sum outside{all.seen - inside.seen, all.bright - inside.bright};
     const float share = inside.seen / static_cast<float>(disc_pixels_);
     if (share < kLidDarkness || outside.seen < 8) return -1e9F;
     return (outside.bright / outside.seen - inside.bright / inside.seen) * std::sqrt(share);
   };
+  const auto contrastAt = [&](int cx, int cy) { return contrastOf(sumOver(cx, cy, disc_), sumOver(cx, cy, ring_)); };
   // Every second place first, then around the best, then between the pixels.
   int best_x = kWidth / 2, best_y = kHeight / 2;
   float best = -1e9F;
-  const int low_x = static_cast<int>(0.5 * (kWidth - 0.8 * kEye)), high_x = kWidth - low_x;
-  const int low_y = static_cast<int>(0.5 * (kHeight - 0.6 * kEye)), high_y = kHeight - low_y;
-  const auto tryAt = [&](int x, int y) {
-    const float contrast = contrastAt(x, y);
+  const auto consider = [&](float contrast, int x, int y) {
     if (contrast > best) best = contrast, best_x = x, best_y = y;
   };
-  for (int y = low_y; y <= high_y; y += 2)
-    for (int x = low_x; x <= high_x; x += 2) tryAt(x, y);
+  const auto tryAt = [&](int x, int y) { consider(contrastAt(x, y), x, y); };
+  // All places of a row together: the same rows of the disc lie side by side there.
+  for (int y = kLowY; y <= kHighY; y += 2) {
+    PlacesInARow inside, all;
+    addPlaces(seen_, bright_, y, disc_, inside);
+    addPlaces(seen_, bright_, y, ring_, all);
+    for (std::size_t i = 0; i < kPlaces; i += 2)
+      consider(contrastOf({inside.seen[i], inside.bright[i]}, {all.seen[i], all.bright[i]}),
+               kLowX + static_cast<int>(i), y);
+  }
   const int coarse_x = best_x, coarse_y = best_y;
   for (int y = coarse_y - 1; y <= coarse_y + 1; ++y)
     for (int x = coarse_x - 1; x <= coarse_x + 1; ++x)
