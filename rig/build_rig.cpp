@@ -12,6 +12,7 @@
 #include "rig/corrections.h"
 #include "rig/find_contacts.h"
 #include "rig/head_frame.h"
+#include "rig/lining.h"
 #include "rig/part_motion.h"
 #include "rig/rigid_parts.h"
 #include "rig/skin_rows.h"
@@ -323,8 +324,9 @@ Rig buildRig(const Mesh& neutral, const FeaturePointChoices& points, const RigOp
   const MaskGeometry mask = controlMaskGeometry(rig.feature_positions, options.edits);
   SkinAssociation association =
       associateSkin(neutral, skin, is_skin, mask, on_skin, eye_separation, options.fade_out_es * eye_separation);
+  const std::vector<SkinTie> lining = findLining(neutral, skin, is_skin, association, eye_separation);
   const SkinProblem problem{neutral, skin, association, on_skin, eye_separation, options.blend_width, options.edits,
-                            t_vertices};
+                            t_vertices, lining};
   const MaskOnSkin control = controlMaskOnSkin(problem, mask);
   SkinRows rows = SkinInterpolation(problem, control).rows();
   const SkinRows skin_rows = options.subdivision.any() ? rows : SkinRows{};

@@ -14,6 +14,8 @@ using Sparse = Eigen::SparseMatrix<double>;
 // Where bending gives way to tension, in eye separations: the reach of what a border of the data says about the slope
 // beyond it. Bending alone goes on with that slope deep into the mouth, and a different mesh has a different slope.
 constexpr double kTensionLength = 0.04;
+// Over what length, in eye separations, a tied vertex may differ from the place that it is tied to.
+constexpr double kTieLength = 0.15;
 
 }  // namespace
 
@@ -32,7 +34,7 @@ struct SkinEquations::State {
 
 SkinEquations::SkinEquations(const Skin& skin, std::span<const std::int32_t> unknown,
                              std::span<const double> data_weight, std::span<const SkinPoint> points,
-                             double eye_separation)
+                             std::span<const SkinTie> ties, double eye_separation)
     : state_(std::make_unique<State>()) {
   const double es2 = eye_separation * eye_separation;
   const auto areaOf = [&](std::uint32_t v) { return std::max(skin.area[v] / es2, 1e-9); };
@@ -80,6 +82,15 @@ SkinEquations::SkinEquations(const Skin& skin, std::span<const std::int32_t> unk
       entries.emplace_back(unknown[v], unknown[v], pull);
       if (u < unknown[v]) entries.emplace_back(unknown[v], u, -pull);
     }
+  }
+  for (const SkinTie& tie : ties) {
+    const double weight = tie.share * areaOf(tie.vertex) * std::pow(2 * 3.14159265358979 / kTieLength, 4);
+    const std::array<std::int32_t, 4> at{unknown[tie.vertex], unknown[tie.to[0]], unknown[tie.to[1]], unknown[tie.to[2]]};
+    const std::array<double, 4> of{1, -tie.weight[0], -tie.weight[1], -tie.weight[2]};
+    if (std::any_of(at.begin(), at.end(), [](std::int32_t u) { return u < 0; })) continue;
+    for (std::size_t i = 0; i < 4; ++i)
+      for (std::size_t j = 0; j < 4; ++j)
+        if (at[i] >= at[j]) entries.emplace_back(at[i], at[j], weight * of[i] * of[j]);
   }
   // Points are held by a weight far above all others; the rows of points that are vertices are set exactly afterwards.
   for (std::uint32_t p = 0; p < points.size(); ++p) {

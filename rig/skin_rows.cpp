@@ -129,7 +129,8 @@ SkinInterpolation::SkinInterpolation(const SkinProblem& problem, const MaskOnSki
   parallelFor(2, [&](std::size_t which) {
     if (which == 0) {
       s.equations =
-          std::make_unique<SkinEquations>(problem.skin, s.unknown, data_weight, mask.points, problem.eye_separation);
+          std::make_unique<SkinEquations>(problem.skin, s.unknown, data_weight, mask.points, problem.lining,
+                                          problem.eye_separation);
     } else {
       s.blend();
       s.makeFade();
@@ -164,7 +165,8 @@ void SkinInterpolation::State::blend() {
 
 SkinInterpolation::~SkinInterpolation() = default;
 
-// 1 on the mask, 0 where the skin stays, in between by how near each is; flat at both ends.
+// 1 on the mask, 0 where the skin stays, in between by how near each is; flat at both ends. A lining fades with the
+// skin in front of it.
 void SkinInterpolation::State::makeFade() {
   std::vector<GeodesicSource> still;
   for (std::uint32_t v = 0; v < unknown.size(); ++v)
@@ -174,6 +176,14 @@ void SkinInterpolation::State::makeFade() {
   for (const std::uint32_t v : vertex) {
     const double beyond = problem.association.beyond[v], left = to_still[v];
     fade.push_back(left < kUnreached ? std::pow(smoothStep(left / (left + beyond + 1e-12)), 2) : 1.0);
+  }
+  const std::vector<double> alone = fade;
+  for (const SkinTie& tie : problem.lining) {
+    double front = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      if (const std::int32_t u = unknown[tie.to[k]]; u >= 0) front += tie.weight[k] * alone[static_cast<std::size_t>(u)];
+    double& own = fade[static_cast<std::size_t>(unknown[tie.vertex])];
+    own += tie.share * (front - own);
   }
 }
 

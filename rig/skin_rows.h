@@ -22,6 +22,7 @@ struct SkinProblem {
   double blend_width;                // RigOptions
   const RegionEdits& edits;
   const std::vector<TVertex>& t_vertices;
+  const std::vector<SkinTie>& lining;  // rig/lining.h
 };
 
 // A mask on the skin: the control mask itself, or a refined one.
@@ -50,7 +51,7 @@ struct SkinRows {
 // 2. The rows x of all vertices minimise the squared Laplacian of x over the skin, plus the squared distance to the
 //    rows of step 1, with the mask's points held exactly and vertices beyond the fade at zero. What has no ray
 //    (nostrils, the inside of the lips, the skin around the mask) so continues its surroundings smoothly, under tension
-//    (skin_equations.h). The Laplacian knows constants, so rows still sum to 1. blend_width: over what part of a mask
+//    (skin_equations.h), and a lining goes with the skin in front of it. The Laplacian knows constants, so rows still sum to 1. blend_width: over what part of a mask
 //    triangle's size the second term gives way to the first.
 // 3. Lips and lids: what the opposite side would contribute is taken out, gradually from that side's own points to
 //    here.

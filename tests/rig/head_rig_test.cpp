@@ -13,6 +13,7 @@
 
 #include "retarget/face_deformer.h"
 #include "rig/build_rig.h"
+#include "rig/closest_point.h"
 #include "rig/mesh_io.h"
 #include "tests/support/test_data.h"
 
@@ -148,6 +149,45 @@ TEST_P(HeadRig, NoTriangleFlipsOverThe52Shapes) {
     }
   }
   EXPECT_EQ(flipped, 0U) << "most in " << worst_shape;
+}
+
+// The lining of the mouth lies a few millimetres behind cheeks and chin. Told by the materials of the head and by rays,
+// not by what the rig takes for a lining.
+TEST_P(HeadRig, MouthsLiningStaysBehindTheSkinInAll52Shapes) {
+  const Mesh& mesh = rig().neutral;
+  std::vector<bool> lining(mesh.vertexCount(), false), skin(mesh.vertexCount(), false);
+  std::vector<std::array<std::uint32_t, 3>> outer;
+  for (std::size_t p = 0; p < mesh.polygonCount(); ++p) {
+    const std::string& name = mesh.materials[mesh.polygon_material[p]].name;
+    const std::uint32_t first = mesh.polygon_start[p], last = mesh.polygon_start[p + 1];
+    for (std::uint32_t c = first; c < last; ++c) {
+      if (name == "mouth") lining[mesh.corner_vertices[c]] = true;
+      if (name == "skin" || name == "lips") skin[mesh.corner_vertices[c]] = true;
+      if (name == "skin" && c + 2 < last)
+        outer.push_back({mesh.corner_vertices[first], mesh.corner_vertices[c + 1], mesh.corner_vertices[c + 2]});
+    }
+  }
+  const ClosestPoint surface(mesh.positions, std::move(outer));
+  const double es = rig().fapu.fapu.eye_separation;
+  const auto normalOf = [](const auto& at, const std::array<std::uint32_t, 3>& t) {
+    return (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0])).normalized().eval();
+  };
+  const auto atRest = [&](std::uint32_t v) -> Eigen::Vector3d { return mesh.positions.row(v).transpose(); };
+  std::size_t followed = 0;
+  for (std::uint32_t v = 0; v < mesh.vertexCount(); ++v) {
+    if (!lining[v] || skin[v]) continue;
+    const SurfacePoint front = surface.find(atRest(v), 0.12 * es);
+    if (front.triangle < 0) continue;
+    const auto& t = surface.triangle(front.triangle);
+    // What is straight behind the triangle, not beside it.
+    if (-normalOf(atRest, t).dot(atRest(v) - atRest(t[0])) < 0.9 * front.distance) continue;
+    ++followed;
+    for (const std::string_view shape : kArkitBlendshapeNames) {
+      const auto in = [&](std::uint32_t u) { return moved(u, {shape}); };
+      EXPECT_LT(normalOf(in, t).dot(in(v) - in(t[0])), 0) << shape << ", vertex " << v;
+    }
+  }
+  EXPECT_GT(followed, 20U);
 }
 
 TEST_P(HeadRig, NeckBorderAndBackOfTheHeadStayWhereTheyAre) {
