@@ -20,6 +20,7 @@ ScriptPlayer::ScriptPlayer(const rig::Rig& rig, const AnimationScript& script, d
       with_mesh_(with_mesh),
       frames_(1 + static_cast<std::uint64_t>(std::floor(script.durationS() * rate_hz + 1e-9))),
       deformer_(rig),
+      fapu_scale_(rig::fapuScale(rig.fapu.fapu)),
       relations_(retarget::shapeRelations(rig.blendshapes, rig.combinations)) {
   for (const rig::Blendshape& shape : rig.blendshapes) {
     const auto index = arkitBlendshapeIndex(shape.name);
@@ -54,7 +55,6 @@ void ScriptPlayer::play(std::uint64_t frame) {
   mask_.head = avatar_.head;
   if (with_mesh_) deformer_.deformAtWeights(avatar_.weights, avatar_.vertices);
 
-  const rig::FeaturePointPositions scale = rig::fapuScale(rig_.fapu.fapu);
   for (std::size_t p = 0; p < kFeaturePointCount; ++p) {
     Eigen::Vector3d moved = Eigen::Vector3d::Zero();
     for (std::size_t k = 0; k < rig_.blendshapes.size(); ++k) {
@@ -65,7 +65,7 @@ void ScriptPlayer::play(std::uint64_t frame) {
     const Eigen::Vector3d in_head = rig_.mesh_from_head.transpose() * moved;
     for (int axis = 0; axis < 3; ++axis)
       mask_.displacement_fapu[p][static_cast<std::size_t>(axis)] =
-          static_cast<float>(in_head[axis] / scale(static_cast<Eigen::Index>(p), axis));
+          static_cast<float>(in_head[axis] / fapu_scale_(static_cast<Eigen::Index>(p), axis));
   }
   mask_.arkit_weights.fill(0.0F);
   for (std::size_t k = 0; k < arkit_.size(); ++k)

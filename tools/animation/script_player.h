@@ -36,6 +36,7 @@ class ScriptPlayer {
   bool with_mesh_;
   std::uint64_t frames_;
   retarget::FaceDeformer deformer_;
+  rig::FeaturePointPositions fapu_scale_;  // mesh units per FAPU, of each point and axis in the head frame
   retarget::ShapeRelations relations_;
   std::vector<std::int32_t> arkit_;  // one per shape: index of its ARKit name, or -1
   AnimationScript::Moment moment_;

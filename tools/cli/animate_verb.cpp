@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -15,6 +16,7 @@
 #include "tools/animation/animation_script.h"
 #include "tools/animation/script_player.h"
 #include "tools/cli/exit_status.h"
+#include "tools/cli/first_subscriber.h"
 #include "tools/cli/frame_files.h"
 #include "tools/cli/nearest_match.h"
 #include "tools/cli/output_file.h"
@@ -47,11 +49,14 @@ class TakeFile : public FrameFile {
         writer_(open(options, rig)) {
     (void)writer_.append(character_);
   }
-  void frame(std::size_t, const AvatarFrame& avatar, std::int64_t) override {
-    AvatarFrame weights = avatar;  // a take holds what was done; the mesh follows from it
-    weights.vertices.clear();
+  void frame(std::size_t, const AvatarFrame&, std::int64_t) override {
     check(writer_.append(player_.mask(), source_));
-    check(writer_.append(weights, character_.name, protocol::characterId(character_)));
+    // A take holds what was done; the mesh follows from it and stays out while the frame is written.
+    AvatarFrame& avatar = player_.avatar();
+    std::swap(avatar.vertices, vertices_);
+    const protocol::Result written = writer_.append(avatar, character_.name, protocol::characterId(character_));
+    std::swap(avatar.vertices, vertices_);
+    check(written);
   }
   void finish() override { check(writer_.finish()); }
 
@@ -76,6 +81,7 @@ class TakeFile : public FrameFile {
   animation::ScriptPlayer& player_;
   protocol::Character character_;
   std::string source_;
+  decltype(AvatarFrame::vertices) vertices_;
   protocol::TakeWriter writer_;
 };
 
@@ -101,18 +107,15 @@ void toSubscribers(const Options& options, const rig::Rig& rig, animation::Scrip
   publisher_options.send_high_water_mark = 16;
   protocol::Publisher publisher(publisher_options);
   publisher.setCharacter(pipeline::characterOf(rig));
-  constexpr int kStep_ms = 100;
-  for (int waited_ms = 0; waited_ms < static_cast<int>(options.wait_s * 1000) && !stopRequested();
-       waited_ms += kStep_ms)
-    if (publisher.waitForSubscriber(protocol::MessageKind::weights, kStep_ms)) break;
+  waitForFirstSubscriber(publisher, options.wait_s);
 
   const pipeline::Pacer pacer(pipeline::monotonicNow(), 1.0);
+  const std::int64_t round_ns = player.time(player.frameCount() > 1 ? player.frameCount() - 1 : 1);
   std::uint64_t sent = 0;
   for (std::uint64_t round = 0; round == 0 || options.loop; ++round) {
     for (std::uint64_t frame = 0; frame < player.frameCount(); ++frame) {
       // The last frame of a round is the first of the next: it is sent once.
       if (options.loop && frame + 1 == player.frameCount() && frame > 0) continue;
-      const std::int64_t round_ns = player.time(player.frameCount() > 1 ? player.frameCount() - 1 : 1);
       const std::int64_t due = pacer.due(static_cast<std::int64_t>(round) * round_ns + player.time(frame));
       while (!stopRequested() && !pacer.wait(due)) {
       }

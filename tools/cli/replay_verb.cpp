@@ -11,6 +11,7 @@
 #include "protocol/topics.h"
 #include "rig/rig_file.h"
 #include "tools/cli/exit_status.h"
+#include "tools/cli/first_subscriber.h"
 #include "tools/cli/read_input.h"
 #include "tools/cli/stop_signal.h"
 #include "tools/cli/tracking_flags.h"
@@ -93,11 +94,7 @@ int run(const Options& options) {
   publisher.setCharacter(pipeline::characterOf(rig, !options.no_mesh));
 
   // In small steps, so that a signal is heard. Without a subscriber it goes on: nobody has to listen.
-  constexpr int kStep_ms = 100;
-  for (int waited_ms = 0; waited_ms < static_cast<int>(options.wait_s * 1000) && !stopRequested();
-       waited_ms += kStep_ms) {
-    if (publisher.waitForSubscriber(protocol::MessageKind::weights, kStep_ms)) break;
-  }
+  waitForFirstSubscriber(publisher, options.wait_s);
   const pipeline::ReplayResult result = pipeline::replay(performance, path, publisher, replay_options, stopRequested);
   printSummary(result, options.stats);
   return kDone;

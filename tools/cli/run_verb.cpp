@@ -23,6 +23,7 @@
 #include "rig/rig_file.h"
 #include "tools/cli/camera_flags.h"
 #include "tools/cli/exit_status.h"
+#include "tools/cli/first_subscriber.h"
 #include "tools/cli/model_flags.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/read_input.h"
@@ -242,8 +243,7 @@ int run(const Options& options) {
     take.emplace(options.record, header, take_options);
   }
 
-  for (int waited_ms = 0; waited_ms < static_cast<int>(options.wait_s * 1000) && !stopRequested(); waited_ms += 100)
-    if (publisher.waitForSubscriber(protocol::MessageKind::weights, 100)) break;
+  waitForFirstSubscriber(publisher, options.wait_s);
 
   installCalibrateSignal();
   pipeline::Live live(rig, std::move(input), publisher, live_options, take ? &*take : nullptr);
