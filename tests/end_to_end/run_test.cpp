@@ -80,6 +80,14 @@ TEST_F(Run, BlackAndNoisyPicturesOfAnySizeShowNobodyAndAreNoError) {
   EXPECT_EQ(done.status, 0) << done.err;
   EXPECT_NE(done.out.find("6 frames"), std::string::npos) << done.out;
   EXPECT_NE(done.out.find(" 0 with a face"), std::string::npos) << done.out;
+  EXPECT_NE(done.err.find("no face in any of the pictures"), std::string::npos) << done.err;
+}
+
+TEST_F(Run, AWindowWithoutADisplayIsRefused) {
+  VOLTO_REQUIRE_DATA(data);
+  Process process({"/usr/bin/env", "-u", "DISPLAY", voltoProgram(), "run", (data / kClip).string(), "--rig", rig(),
+                   "--models", (data / "models").string(), "--publish", endpoint("window"), "--window"});
+  expectRefused(process.wait(), 69, "run", "$DISPLAY is not set");
 }
 
 TEST_F(Run, AClipIsTrackedRecordedAndDrawn) {

@@ -32,6 +32,7 @@
 #include "tools/pipeline/character.h"
 #include "tools/pipeline/live.h"
 #include "tools/pipeline/preview.h"
+#include "tools/pipeline/preview_window.h"
 #include "tools/pipeline/profile_file.h"
 #include "tracker/landmark_layout.h"
 
@@ -57,9 +58,12 @@ struct Options {
   std::string record;
   bool force = false;
   std::string preview, sheet;
+  bool window = false;
   bool no_mesh = false, stats = false;
   int threads = 0;
   double wait_s = 0, seconds = 0;
+
+  bool wantsPreview() const { return window || !preview.empty() || !sheet.empty(); }
 };
 
 pipeline::LiveInput openInput(const Options& options) {
@@ -211,14 +215,20 @@ int run(const Options& options) {
   live_options.every_frame = !input.live && !options.realtime;
   if (!live_options.every_frame && options.threads == 0) capture::measureNetworkThreads();
   live_options.tracking.tracker.from_pixels = true;
-  live_options.mesh = !options.no_mesh || !options.preview.empty() || !options.sheet.empty();
+  live_options.mesh = !options.no_mesh || options.wantsPreview();
 
   std::optional<pipeline::Preview> preview;
-  if (!options.preview.empty() || !options.sheet.empty()) {
+  if (options.wantsPreview()) {
     pipeline::PreviewOptions preview_options;
     preview_options.live = options.preview;
     preview_options.sheet = options.sheet;
-    preview.emplace(rig, preview_options);
+    if (options.window) preview_options.window = "Volto: " + input.name;
+    try {
+      preview.emplace(rig, preview_options);
+    } catch (const pipeline::NoDisplay& error) {
+      throw CommandError(kUnavailable, std::string("--window: ") + error.what() +
+                                           "; give --preview F.png, a picture that is made anew again and again");
+    }
     live_options.keep_images = true;
     live_options.look = [&preview](const pipeline::LiveFrame& frame) { preview->look(frame); };
   }
@@ -246,6 +256,7 @@ int run(const Options& options) {
   waitForFirstSubscriber(publisher, options.wait_s);
 
   installCalibrateSignal();
+  const bool input_shows_pictures = input.finder.has_value();
   pipeline::Live live(rig, std::move(input), publisher, live_options, take ? &*take : nullptr);
   Watcher watcher(options.stats);
   live.start();
@@ -259,6 +270,11 @@ int run(const Options& options) {
   const pipeline::LiveReport report = live.report();
   watcher.look(report);
   if (preview) preview->finish();
+  if (input_shows_pictures && report.frames_sent > 0 && report.finder.faces == 0)
+    std::fprintf(stderr,
+                 "volto run: %s: no face in any of the pictures; is it lit, upright and not too "
+                 "small? --sheet F.png shows what was seen\n",
+                 options.source.c_str());
   saveProfile(options.profile, live.neutral());
   printSummary(options, report);
   if (take) {
@@ -313,6 +329,7 @@ RunVerb defineRun(CLI::App& app) {
   app.add_option("--preview", options->preview,
                  "a picture of the face with landmarks and axes beside the avatar, made anew twice a second")
       ->type_name("F.png");
+  app.add_flag("--window", options->window, "the same in a window");
   app.add_option("--sheet", options->sheet, "at the end: moments of the performance, face beside avatar")
       ->type_name("F.png");
   app.add_flag("--no-mesh", options->no_mesh, "weights only: neither compute nor publish the deformed mesh");

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 #include <span>
 #include <string>
 #include <thread>
@@ -18,6 +19,7 @@
 #include "tools/picture/rig_look.h"
 #include "tools/picture/text.h"
 #include "tools/pipeline/pacer.h"
+#include "tools/pipeline/preview_window.h"
 #include "tools/pipeline/slot.h"
 
 namespace volto::pipeline {
@@ -155,6 +157,12 @@ struct Preview::State {
       return picture::Vec3{r.x(), r.y(), r.z()};
     };
     view.head_from_mesh = {row(0), row(1), row(2)};
+    if (!options.window.empty()) window.emplace(options.window, 2 * options.size_px, options.size_px);
+  }
+
+  bool isLive() const { return !options.live.empty() || window; }
+  std::int64_t interval() const {
+    return static_cast<std::int64_t>((window ? options.window_interval_s : options.interval_s) * 1e9);
   }
 
   picture::Picture draw(const Seen& seen) {
@@ -174,8 +182,12 @@ struct Preview::State {
       const auto taken = slot.take(seen, 200ms);
       if (taken == Slot<Seen>::Taken::closed) return;
       if (taken == Slot<Seen>::Taken::nothing) continue;
+      const picture::Picture drawn = draw(seen);
+      if (window && !window_closed) window_closed = !window->show(drawn);
+      const std::int64_t now = monotonicNow();
+      if (options.live.empty() || now < next_file_ns) continue;
+      next_file_ns = now + static_cast<std::int64_t>(options.interval_s * 1e9);
       try {
-        const picture::Picture drawn = draw(seen);
         picture::writePng(options.live, drawn);
       } catch (const std::exception&) {  // a full disk must not stop the show; finish() tries again and tells
       }
@@ -185,6 +197,10 @@ struct Preview::State {
   PreviewOptions options;
   picture::HeadRenderer renderer;
   picture::ViewOptions view;
+  std::optional<PreviewWindow> window;
+  // The drawing thread's own.
+  bool window_closed = false;
+  std::int64_t next_file_ns = 0;
   Slot<Seen> slot{SlotPolicy::newest_wins};
   std::thread thread;
   Seen next, last;
@@ -197,7 +213,7 @@ struct Preview::State {
 
 Preview::Preview(const rig::Rig& rig, const PreviewOptions& options) : state_(std::make_unique<State>(rig, options)) {
   State& s = *state_;
-  if (!options.live.empty()) s.thread = std::thread([&s] { s.drawLive(); });
+  if (s.isLive()) s.thread = std::thread([&s] { s.drawLive(); });
 }
 
 Preview::~Preview() {
@@ -210,9 +226,9 @@ void Preview::look(const LiveFrame& frame) {
   State& s = *state_;
   if (s.first_ns < 0) s.first_ns = frame.t_source_ns;
   const std::int64_t t_ns = frame.t_source_ns - s.first_ns;
-  if (!s.options.live.empty()) {
+  if (s.isLive()) {
     if (const std::int64_t now = monotonicNow(); now >= s.next_live_ns) {
-      s.next_live_ns = now + static_cast<std::int64_t>(s.options.interval_s * 1e9);
+      s.next_live_ns = now + s.interval();
       copyInto(frame, t_ns, s.next);
       s.slot.put(s.next);
     }

@@ -1,9 +1,10 @@
 // What the pipeline sees beside what it makes of it: the image with landmarks, pupils and the head's axes, and the
-// avatar. Pictures only, no window: they are looked at with any viewer that reloads a file.
+// avatar: in a window, as a file that is made anew again and again, and as a sheet of moments at the end.
 #pragma once
 
 #include <filesystem>
 #include <memory>
+#include <string>
 
 #include "rig/rig.h"
 #include "tools/picture/picture.h"
@@ -21,6 +22,8 @@ struct PreviewOptions {
   std::filesystem::path live;   // a picture that is made anew again and again; empty: none
   std::filesystem::path sheet;  // moments spread over all that was seen, written by finish(); empty: none
   double interval_s = 0.5;      // of the live picture
+  std::string window;           // title of a window that shows it; empty: none
+  double window_interval_s = 0.1;
   std::size_t moments = 24;     // of the sheet
   int size_px = 256;
 };
@@ -28,6 +31,7 @@ struct PreviewOptions {
 // look() is called from one thread and only copies now and then; a thread of its own draws. Memory is bounded.
 class Preview {
  public:
+  // Throws NoDisplay (preview_window.h).
   Preview(const rig::Rig& rig, const PreviewOptions& options);
   ~Preview();
   Preview(const Preview&) = delete;
