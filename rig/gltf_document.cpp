@@ -283,6 +283,7 @@ class Opener {
     keep("scenes", {"nodes"});
     keep("nodes", {"children", "mesh", "skin", "matrix", "translation", "rotation", "scale", "name"});
     keep("meshes", {"primitives", "name", "extras"});
+    keep("skins", {"joints", "inverseBindMatrices"});
     keep("accessors", {"bufferView", "byteOffset", "componentType", "normalized", "count", "type", "sparse"});
     keep("bufferViews", {"buffer", "byteOffset", "byteLength", "byteStride"});
     keep("materials", {"name", "pbrMetallicRoughness"});

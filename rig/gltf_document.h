@@ -14,7 +14,7 @@ namespace volto::rig {
 
 // Borrows the bytes given to openGltf().
 struct GltfDocument {
-  tinygltf::Model model;  // meshes, nodes, scenes, accessors, bufferViews, materials; no images, no buffers
+  tinygltf::Model model;  // meshes, skins, nodes, scenes, accessors, bufferViews, materials; no images, no buffers
   std::vector<std::string_view> buffers;
   std::vector<std::string> owned;  // bytes of buffers that are not part of the file itself
   std::vector<bool> textured;      // of each material: its colour comes from an image, which is not read

@@ -13,6 +13,7 @@
 #include <Eigen/Geometry>
 
 #include "rig/gltf_document.h"
+#include "rig/gltf_skin.h"
 #include "rig/mesh_builder.h"
 #include "rig/mesh_io.h"
 #include "rig/mesh_limits.h"
@@ -25,6 +26,7 @@ constexpr std::size_t kMaxNodes = 100'000;
 constexpr std::size_t kMaxNodeDepth = 512;
 // A mesh of the largest size needs about a third of this; a file that has the same bytes read over and over ends here.
 constexpr std::size_t kMaxValuesRead = 64'000'000;
+constexpr std::size_t kMaxJoints = 65'535;
 constexpr const char* kVertexAttribute = "_VOLTO_VERTEX";
 
 class GltfMeshReader {
@@ -33,6 +35,36 @@ class GltfMeshReader {
       : document_(document), model_(document.model), name_(name), with_shapes_(with_shapes) {}
 
   Mesh read() { return std::move(readShaped().mesh); }
+
+  GltfSkin readSkin() {
+    with_skin_ = true;
+    readShaped();
+    GltfSkin out;
+    std::map<int, std::uint16_t> index;  // of a node: of its joint
+    for (const int node : order_) {
+      const auto bind = mesh_from_joint_.find(node);
+      if (bind == mesh_from_joint_.end()) continue;
+      index[node] = static_cast<std::uint16_t>(out.joints.size());
+      GltfSkin::Joint joint;
+      joint.name = tidyText(model_.nodes[static_cast<std::size_t>(node)].name);
+      if (joint.name.empty()) joint.name = "joint " + std::to_string(out.joints.size());
+      joint.mesh_from_joint = bind->second;
+      for (int above = parent_[static_cast<std::size_t>(node)]; above >= 0 && joint.parent < 0;
+           above = parent_[static_cast<std::size_t>(above)])
+        if (const auto found = index.find(above); found != index.end()) joint.parent = found->second;
+      out.joints.push_back(std::move(joint));
+    }
+    if (index.size() != mesh_from_joint_.size()) fail("a joint that is not part of the scene");
+    for (const auto& of_vertex : carried_by_) {
+      auto& joint = out.joint.emplace_back();
+      auto& weight = out.weight.emplace_back();
+      for (std::size_t i = 0; i < 4; ++i) {
+        joint[i] = of_vertex.weight[i] > 0 ? index.at(of_vertex.node[i]) : std::uint16_t{0};
+        weight[i] = static_cast<float>(of_vertex.weight[i]);
+      }
+    }
+    return out;
+  }
 
   ShapedMesh readShaped() {
     for (const Placed& placed : placedMeshes()) addMesh(placed);
@@ -53,8 +85,8 @@ class GltfMeshReader {
     for (auto& [name, displacement] : shapes_) {
       displacement.resize(coordinates_.size(), 0.0);
       out.names.push_back(name);
-      out.positions.push_back(mesh_.positions + Eigen::Map<const VertexPositions>(displacement.data(),
-                                                                                  mesh_.positions.rows(), 3));
+      out.positions.push_back(mesh_.positions +
+                              Eigen::Map<const VertexPositions>(displacement.data(), mesh_.positions.rows(), 3));
     }
     putBackTogether(out.positions);
     mesh_.notes = notes_.take();
@@ -66,12 +98,17 @@ class GltfMeshReader {
   struct Placed {
     int mesh;
     Eigen::Affine3d scene_from_mesh;
+    int skin = -1;
+  };
+  struct Carried {
+    std::array<int, 4> node{};
+    std::array<double, 4> weight{};
   };
 
   [[noreturn]] void fail(const std::string& what) const { throw InputError(name_ + ": " + what); }
 
   // Every mesh that the scene shows, where it shows it.
-  std::vector<Placed> placedMeshes() const {
+  std::vector<Placed> placedMeshes() {
     std::vector<Placed> out;
     if (model_.nodes.empty()) {
       for (std::size_t m = 0; m < model_.meshes.size(); ++m)
@@ -80,6 +117,7 @@ class GltfMeshReader {
     }
     if (model_.nodes.size() > kMaxNodes) fail("more than 100000 nodes");
     std::vector<bool> seen(model_.nodes.size(), false);
+    parent_.assign(model_.nodes.size(), -1);
     struct Visit {
       int node;
       std::size_t depth;
@@ -98,12 +136,16 @@ class GltfMeshReader {
       if (seen[static_cast<std::size_t>(visit.node)]) fail(which + " stands in the scene twice; its nodes are no tree");
       if (visit.depth > kMaxNodeDepth) fail("nodes nested deeper than 512 levels");
       seen[static_cast<std::size_t>(visit.node)] = true;
+      order_.push_back(visit.node);
       const tinygltf::Node& node = model_.nodes[static_cast<std::size_t>(visit.node)];
       const Eigen::Affine3d here = visit.parent * transformOf(node, which);
       // A skinned mesh stands where its bones put it; at rest that is where its vertices are.
-      if (node.mesh >= 0) out.push_back({node.mesh, node.skin >= 0 ? Eigen::Affine3d::Identity() : here});
-      for (auto child = node.children.rbegin(); child != node.children.rend(); ++child)
+      if (node.mesh >= 0) out.push_back({node.mesh, node.skin >= 0 ? Eigen::Affine3d::Identity() : here, node.skin});
+      for (auto child = node.children.rbegin(); child != node.children.rend(); ++child) {
         stack.push_back({*child, visit.depth + 1, here});
+        if (*child >= 0 && static_cast<std::size_t>(*child) < parent_.size())
+          parent_[static_cast<std::size_t>(*child)] = visit.node;
+      }
     }
     return out;
   }
@@ -165,6 +207,7 @@ class GltfMeshReader {
       const std::size_t count = fresh ? addVertices(position->second, placed.scene_from_mesh)
                                       : model_.accessors[static_cast<std::size_t>(position->second)].count;
       addAttributes(primitive, entry->second, count);
+      if (fresh && with_skin_ && placed.skin >= 0) addSkin(primitive, placed.skin, entry->second, count);
       if (fresh && with_shapes_) addTargets(primitive, placed, entry->second, count);
       addTriangles(primitive, mode, entry->second, count, mirrored);
     }
@@ -197,6 +240,7 @@ class GltfMeshReader {
     texcoords_.resize(vertices, {0.0F, 0.0F});
     colours_.resize(vertices, {1.0F, 1.0F, 1.0F});
     original_.resize(vertices, -1.0);
+    carried_by_.resize(vertices);
     return positions.size() / 3;
   }
 
@@ -232,6 +276,47 @@ class GltfMeshReader {
       const std::vector<double> number = values(*original, 1, kMaxVertices);
       sameCount(number, 1, "vertex numbers");
       for (std::size_t v = 0; v < count; ++v) original_[first + v] = number[v];
+    }
+  }
+
+  void addSkin(const tinygltf::Primitive& primitive, int number, std::uint32_t first, std::size_t count) {
+    if (static_cast<std::size_t>(number) >= model_.skins.size())
+      fail("skin " + std::to_string(number) + " does not exist");
+    const tinygltf::Skin& skin = model_.skins[static_cast<std::size_t>(number)];
+    if (skin.joints.size() > kMaxJoints) fail("a skin of more than 65535 joints");
+    std::vector<double> bind;
+    if (skin.inverseBindMatrices >= 0) bind = values(skin.inverseBindMatrices, 16, kMaxJoints);
+    if (!bind.empty() && bind.size() < 16 * skin.joints.size()) fail("a skin with fewer bind matrices than joints");
+    for (std::size_t j = 0; j < skin.joints.size(); ++j) {
+      const int node = skin.joints[j];
+      if (node < 0 || static_cast<std::size_t>(node) >= model_.nodes.size())
+        fail("joint " + std::to_string(j) + " is node " + std::to_string(node) + ", which does not exist");
+      Eigen::Affine3d joint_from_mesh = Eigen::Affine3d::Identity();
+      if (!bind.empty()) joint_from_mesh.matrix() = Eigen::Map<const Eigen::Matrix4d>(bind.data() + 16 * j);
+      const Eigen::Affine3d mesh_from_joint = joint_from_mesh.inverse(Eigen::Affine);
+      if (!mesh_from_joint.matrix().allFinite())
+        fail("the bind matrix of joint " + std::to_string(j) + " has no inverse");
+      mesh_from_joint_.emplace(node, mesh_from_joint);
+    }
+    const auto joints = primitive.attributes.find("JOINTS_0"), weights = primitive.attributes.find("WEIGHTS_0");
+    if (joints == primitive.attributes.end() || weights == primitive.attributes.end()) return;
+    const std::vector<double> joint = values(joints->second, 4, kMaxVertices);
+    const std::vector<double> weight = values(weights->second, 4, kMaxVertices);
+    if (joint.size() != 4 * count || weight.size() != 4 * count)
+      fail("joints or weights for another number of vertices than the primitive's " + std::to_string(count));
+    for (std::size_t v = 0; v < count; ++v) {
+      Carried& carried = carried_by_[first + v];
+      double sum = 0;
+      for (std::size_t i = 0; i < 4; ++i) {
+        const double w = weight[4 * v + i], j = joint[4 * v + i];
+        if (!(w >= 0 && w < 1e6)) fail("vertex " + std::to_string(v) + " hangs on a joint by a weight below 0");
+        if (w > 0 && !(j >= 0 && j < static_cast<double>(skin.joints.size())))
+          fail("vertex " + std::to_string(v) + " hangs on a joint that the skin has not");
+        carried.node[i] = w > 0 ? skin.joints[static_cast<std::size_t>(j)] : 0;
+        carried.weight[i] = w;
+        sum += w;
+      }
+      for (double& w : carried.weight) w = sum > 0 ? w / sum : 0.0;
     }
   }
 
@@ -363,6 +448,9 @@ class GltfMeshReader {
       for (std::size_t w = 0; w < wanted; ++w) whole.row(static_cast<Eigen::Index>(w)) = shape.row(from[w]);
       shape = std::move(whole);
     }
+    std::vector<Carried> carried;
+    for (const std::int64_t v : from) carried.push_back(carried_by_[static_cast<std::size_t>(v)]);
+    carried_by_ = std::move(carried);
     mesh_.positions = std::move(positions);
     mesh_.vertex_colours = std::move(colours);
     for (std::uint32_t& v : mesh_.corner_vertices) v = static_cast<std::uint32_t>(original_[v]);
@@ -380,7 +468,10 @@ class GltfMeshReader {
   std::vector<int> materials_;                   // of triangles, the file's numbers
   bool has_texcoords_ = false, has_colours_ = false;
   std::size_t skipped_ = 0, values_read_ = 0;
-  bool with_shapes_ = false;
+  bool with_shapes_ = false, with_skin_ = false;
+  std::vector<Carried> carried_by_;                                  // of vertices
+  std::map<int, Eigen::Affine3d> mesh_from_joint_;                   // of nodes that are joints
+  std::vector<int> order_, parent_;                                  // nodes of the scene, parents first; of each node
   std::vector<std::pair<std::string, std::vector<double>>> shapes_;  // name, displacement of the vertices so far
   std::set<std::pair<std::uint32_t, int>> applied_;  // first vertex and accessor of attributes that were read
 };
@@ -398,6 +489,11 @@ ShapedMesh parseGltfShapes(std::string_view bytes, const std::string& name_for_e
   ShapedMesh out = GltfMeshReader(document, name_for_errors, true).readShaped();
   if (out.names.empty()) throw InputError(name_for_errors + ": has no morph targets; export it with its shape keys");
   return out;
+}
+
+GltfSkin parseGltfSkin(std::string_view bytes, const std::string& name_for_errors, const std::filesystem::path& folder) {
+  const GltfDocument document = openGltf(bytes, name_for_errors, folder);
+  return GltfMeshReader(document, name_for_errors, false).readSkin();
 }
 
 }  // namespace volto::rig

@@ -1,5 +1,7 @@
 #include "rig/mesh_io.h"
 
+#include "rig/gltf_skin.h"
+
 #include <charconv>
 #include <map>
 #include <stdexcept>
@@ -67,6 +69,10 @@ Mesh readMesh(const std::filesystem::path& path) {
 
 ShapedMesh readGltfShapes(const std::filesystem::path& path) {
   return parseGltfShapes(readFileBytes(path, kMaxMeshFileBytes), path.string(), folderOf(path));
+}
+
+GltfSkin readGltfSkin(const std::filesystem::path& path) {
+  return parseGltfSkin(readFileBytes(path, kMaxMeshFileBytes), path.string(), folderOf(path));
 }
 
 std::string formatObj(const Mesh& mesh, const VertexPositions& positions, const ObjOptions& options) {

@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "rig/file_bytes.h"
+#include "rig/gltf_skin.h"
 #include "rig/rig_file.h"
 #include "tools/cli/exit_status.h"
 #include "tools/cli/output_file.h"
@@ -27,6 +28,7 @@ struct Options {
   std::string rig;
   std::string output;
   std::string take;
+  std::string skin;
   std::size_t every = 1;
   TrackingFlags tracking;
 };
@@ -47,9 +49,23 @@ exporter::Movement movementOf(const rig::Rig& rig, const Options& options) {
   return recorder.movement();
 }
 
+rig::GltfSkin skinFor(const rig::Rig& rig, const Options& options) {
+  requireReadable(options.skin);
+  if (!hasExtension(options.skin, ".glb") && !hasExtension(options.skin, ".gltf"))
+    throw CommandError(kBadData, options.skin + ": a skin is read from a .glb or .gltf file");
+  rig::GltfSkin skin = rig::readGltfSkin(options.skin);
+  if (skin.joints.empty()) throw CommandError(kBadData, options.skin + ": has no skin; export it with its armature");
+  if (skin.joint.size() != rig.neutral.vertexCount())
+    throw CommandError(kBadData, options.skin + ": " + std::to_string(skin.joint.size()) +
+                                     " vertices, the character has " + std::to_string(rig.neutral.vertexCount()) +
+                                     "; give the file that it was rigged from");
+  return skin;
+}
+
 int run(const Options& options) {
   requireReadable(options.rig);
   if (!hasExtension(options.output, ".glb")) {
+    if (!options.skin.empty()) throw CommandError(kWrongUsage, "--skin goes into a GLB file; OBJ files hold no bones");
     if (!options.take.empty())
       throw CommandError(kWrongUsage,
                          "--take goes into a GLB file; for a folder of OBJ files per frame use volto bake --obj");
@@ -72,12 +88,15 @@ int run(const Options& options) {
   requireDifferent(options.rig, options.output);
   requireReplaceable(options.output);
   const rig::Rig rig = rig::readRig(options.rig);
+  std::optional<rig::GltfSkin> skin;
+  if (!options.skin.empty()) skin = skinFor(rig, options);
   std::optional<exporter::Movement> movement;
   if (!options.take.empty()) {
     requireDifferent(options.take, options.output);
     movement = movementOf(rig, options);
   }
-  rig::writeFileAtomically(options.output, exporter::formatGlb(rig, movement ? &*movement : nullptr));
+  rig::writeFileAtomically(options.output,
+                           exporter::formatGlb(rig, movement ? &*movement : nullptr, skin ? &*skin : nullptr));
   return kDone;
 }
 
@@ -97,6 +116,10 @@ RunVerb defineExport(CLI::App& app) {
                  "or a Live Link "
                  "Face CSV file")
       ->type_name("TAKE");
+  app.add_option("--skin", options->skin,
+                 "the GLB or glTF file that the character was rigged from: its bones and what hangs on them go into "
+                 "the GLB file too")
+      ->type_name("S.glb");
   app.add_option("--every", options->every, "of the take, every Nth frame (default 1)")
       ->type_name("N")
       ->check(CLI::Range(std::size_t{1}, std::size_t{1000000}));

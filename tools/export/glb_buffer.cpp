@@ -98,6 +98,16 @@ int GlbBuffer::colours(std::span<const Float3> values) {
   return out;
 }
 
+int GlbBuffer::joints(std::span<const std::array<std::uint16_t, 4>> values) {
+  return accessor(view(values.data(), values.size_bytes(), TINYGLTF_TARGET_ARRAY_BUFFER),
+                  TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT, TINYGLTF_TYPE_VEC4, values.size());
+}
+
+int GlbBuffer::matrices4(std::span<const std::array<float, 16>> values) {
+  return accessor(view(values.data(), values.size_bytes(), 0), TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_MAT4,
+                  values.size());
+}
+
 int GlbBuffer::indices(std::span<const std::uint32_t> values, std::size_t vertices) {
   // 65535 itself means "begin a new strip" to graphics cards.
   if (vertices > 65535)

@@ -24,6 +24,9 @@ class GlbBuffer {
   int vectors4(std::span<const std::array<float, 4>> values);
   // RGB 0..1 as 16-bit RGBA.
   int colours(std::span<const Float3> values);
+  // Of a skin's joints, and its bind matrices, column by column.
+  int joints(std::span<const std::array<std::uint16_t, 4>> values);
+  int matrices4(std::span<const std::array<float, 16>> values);
   int indices(std::span<const std::uint32_t> values, std::size_t vertices);
   // Only what differs from zero by more than `least` in some component, when that takes fewer bytes.
   int sparseVectors3(std::span<const Float3> values, float least, bool bounds);

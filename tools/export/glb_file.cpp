@@ -20,8 +20,8 @@ constexpr float kLeastNormalChange = 2e-3F;
 
 class GlbMaker {
  public:
-  GlbMaker(const rig::Rig& rig, const Movement* movement)
-      : rig_(rig), movement_(movement), parts_(takeApart(rig)), buffer_(model_) {}
+  GlbMaker(const rig::Rig& rig, const Movement* movement, const rig::GltfSkin* skin)
+      : rig_(rig), movement_(movement), skin_(skin), parts_(takeApart(rig)), buffer_(model_) {}
 
   std::string make() {
     model_.asset.version = "2.0";
@@ -67,7 +67,8 @@ class GlbMaker {
     if (std::abs(upright.w()) < 1.0 - 1e-9) root.rotation = {upright.x(), upright.y(), upright.z(), upright.w()};
     head.name = "head";
     head.translation = {pivot.x(), pivot.y(), pivot.z()};
-    for (std::size_t p = 0; p < parts_.parts.size(); ++p) head.children.push_back(static_cast<int>(2 + p));
+    for (std::size_t p = 0; p < parts_.parts.size(); ++p)
+      if (!skinned(parts_.parts[p])) head.children.push_back(static_cast<int>(2 + p));
     model_.nodes.push_back(std::move(root));
     model_.nodes.push_back(std::move(head));
     for (const ExportPart& part : parts_.parts) {
@@ -75,14 +76,65 @@ class GlbMaker {
       node.name = part.name;
       node.mesh = static_cast<int>(model_.meshes.size());
       const Eigen::Vector3d move = Eigen::Vector3d(part.origin[0], part.origin[1], part.origin[2]) - pivot;
-      node.translation = {move.x(), move.y(), move.z()};
+      if (!skinned(part)) node.translation = {move.x(), move.y(), move.z()};
       model_.nodes.push_back(std::move(node));
       mesh(part);
     }
     tinygltf::Scene scene;
     scene.nodes = {0};
+    if (skin_ != nullptr) joints(pivot, scene);
     model_.scenes.push_back(std::move(scene));
     model_.defaultScene = 0;
+  }
+
+  // A skinned mesh is where its joints put it, wherever its node is: it stands at the top, its vertices in the artist's
+  // frame.
+  bool skinned(const ExportPart& part) const { return skin_ != nullptr && !part.eye; }
+
+  void joints(const Eigen::Vector3d& pivot, tinygltf::Scene& scene) {
+    const auto first = static_cast<int>(model_.nodes.size());
+    tinygltf::Skin out;
+    std::vector<std::array<float, 16>> bind;
+    for (std::size_t j = 0; j < skin_->joints.size(); ++j) {
+      const rig::GltfSkin::Joint& joint = skin_->joints[j];
+      Eigen::Affine3d above(Eigen::Translation3d{pivot});
+      if (joint.parent >= 0) above = skin_->joints[static_cast<std::size_t>(joint.parent)].mesh_from_joint;
+      tinygltf::Node node;
+      node.name = joint.name;
+      place(above.inverse(Eigen::Affine) * joint.mesh_from_joint, node);
+      model_.nodes.push_back(std::move(node));
+      const int parent = joint.parent >= 0 ? first + joint.parent : 1;
+      model_.nodes[static_cast<std::size_t>(parent)].children.push_back(first + static_cast<int>(j));
+      out.joints.push_back(first + static_cast<int>(j));
+      Eigen::Map<Eigen::Matrix4f>(bind.emplace_back().data()) =
+          joint.mesh_from_joint.inverse(Eigen::Affine).matrix().cast<float>();
+      bind.back()[3] = bind.back()[7] = bind.back()[11] = 0.0F;
+      bind.back()[15] = 1.0F;
+    }
+    out.inverseBindMatrices = buffer_.matrices4(bind);
+    model_.skins.push_back(std::move(out));
+    for (std::size_t p = 0; p < parts_.parts.size(); ++p) {
+      if (!skinned(parts_.parts[p])) continue;
+      model_.nodes[2 + p].skin = 0;
+      scene.nodes.push_back(static_cast<int>(2 + p));
+    }
+  }
+
+  // Turn, stretch and shift where the transform is no more than that, which programs can animate; else the matrix.
+  static void place(const Eigen::Affine3d& transform, tinygltf::Node& node) {
+    Eigen::Matrix3d rotation, stretch;
+    transform.computeRotationScaling(&rotation, &stretch);
+    const Eigen::Vector3d scale = stretch.diagonal();
+    if ((stretch - Eigen::Matrix3d(scale.asDiagonal())).norm() > 1e-6 * stretch.norm()) {
+      const Eigen::Matrix4d m = transform.matrix();
+      node.matrix.assign(m.data(), m.data() + 16);
+      return;
+    }
+    const Eigen::Quaterniond q(rotation);
+    const Eigen::Vector3d shift = transform.translation();
+    node.rotation = {q.x(), q.y(), q.z(), q.w()};
+    node.translation = {shift.x(), shift.y(), shift.z()};
+    if ((scale - Eigen::Vector3d::Ones()).norm() > 1e-6) node.scale = {scale.x(), scale.y(), scale.z()};
   }
 
   // Where a head turns: between the ears. On a grid of the head's size / 1024, so that moving there and back again
@@ -118,7 +170,8 @@ class GlbMaker {
   }
 
   void mesh(const ExportPart& part) {
-    const Eigen::RowVector3d origin(part.origin[0], part.origin[1], part.origin[2]);
+    Eigen::RowVector3d origin(part.origin[0], part.origin[1], part.origin[2]);
+    if (skinned(part)) origin.setZero();
     std::vector<Float3> positions, normals;
     std::vector<float> numbers;
     if (base_normals_.rows() == 0) base_normals_ = rig::smoothNormals(rig_.neutral, rig_.neutral.positions);
@@ -139,6 +192,19 @@ class GlbMaker {
     if (!part.colours.empty()) common.attributes["COLOR_0"] = buffer_.colours(part.colours);
     common.attributes["_VOLTO_VERTEX"] = buffer_.floats(numbers, false);
     model_.bufferViews.back().target = TINYGLTF_TARGET_ARRAY_BUFFER;
+    if (skinned(part)) {
+      std::vector<std::array<std::uint16_t, 4>> joint;
+      std::vector<std::array<float, 4>> weight;
+      for (const std::uint32_t v : part.vertex) {
+        joint.push_back(skin_->joint[v]);
+        weight.push_back(skin_->weight[v]);
+        // What no bone carries stays with the first.
+        if (weight.back() == std::array<float, 4>{}) weight.back()[0] = 1.0F;
+      }
+      common.attributes["JOINTS_0"] = buffer_.joints(joint);
+      common.attributes["WEIGHTS_0"] = buffer_.vectors4(weight);
+      model_.bufferViews.back().target = TINYGLTF_TARGET_ARRAY_BUFFER;
+    }
     tinygltf::Mesh out;
     out.name = part.name;
     if (!part.eye) morphTargets(part, common, out);
@@ -219,6 +285,7 @@ class GlbMaker {
 
   const rig::Rig& rig_;
   const Movement* movement_;
+  const rig::GltfSkin* skin_;
   CharacterParts parts_;
   tinygltf::Model model_;
   GlbBuffer buffer_;
@@ -227,6 +294,11 @@ class GlbMaker {
 
 }  // namespace
 
-std::string formatGlb(const rig::Rig& rig, const Movement* movement) { return GlbMaker(rig, movement).make(); }
+std::string formatGlb(const rig::Rig& rig, const Movement* movement, const rig::GltfSkin* skin) {
+  if (skin != nullptr && (skin->joints.empty() || skin->joint.size() != rig.neutral.vertexCount()))
+    throw std::invalid_argument("a skin of " + std::to_string(skin->joint.size()) + " vertices for a mesh of " +
+                                std::to_string(rig.neutral.vertexCount()));
+  return GlbMaker(rig, movement, skin).make();
+}
 
 }  // namespace volto::exporter

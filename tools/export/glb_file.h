@@ -8,6 +8,7 @@
 
 #include <string>
 
+#include "rig/gltf_skin.h"
 #include "rig/rig.h"
 #include "tools/export/movement.h"
 
@@ -15,7 +16,9 @@ namespace volto::exporter {
 
 // The bytes of the file; the same input gives the same bytes. `movement`: an animation "take" of weights and rotations,
 // or null. What a morph target is, is deformAtWeights() with that shape's weight 1 (retarget/face_deformer.h). Throws
-// std::length_error above 2 GB.
-std::string formatGlb(const rig::Rig& rig, const Movement* movement = nullptr);
+// `skin`: bones that carry the face besides, or null; one entry per vertex of the rig's mesh (std::invalid_argument
+// otherwise). Its joints stand below `head` and turn with it; the eyes hang on `head` alone. Throws std::length_error
+// above 2 GB.
+std::string formatGlb(const rig::Rig& rig, const Movement* movement = nullptr, const rig::GltfSkin* skin = nullptr);
 
 }  // namespace volto::exporter
