@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "rig/gltf_skin.h"
 #include "tests/rig/mesh_bytes.h"
 #include "tests/support/test_data.h"
 
@@ -54,6 +55,66 @@ TEST(Gltf, TriangleWithMaterialAndTextureCoordinates) {
   EXPECT_EQ(mesh.materials[0].name, "skin");
   EXPECT_EQ(mesh.materials[0].colour, (std::array<float, 3>{0.5F, 0.25F, 0.125F}));
   EXPECT_EQ(mesh.corner_texcoords[0], (std::array<float, 2>{0.0F, 0.25F})) << "glTF counts v from the top";
+}
+
+// The triangle on two bones: a hip at (1, 2, 3), a jaw that stands in the hip by `jaw_bind`, written before it.
+std::string skinnedTriangle(const std::array<int, 4>& joints, const std::array<float, 4>& weights,
+                            const std::string& skin = R"({"joints":[2,1],"inverseBindMatrices":5})",
+                            float diagonal = 1.0F) {
+  std::string bytes = triangleBytes();
+  for (int v = 0; v < 3; ++v)
+    for (const int joint : joints) bytes += static_cast<char>(joint);
+  for (int v = 0; v < 3; ++v)
+    for (const float weight : weights) bytes += bytesOf(weight);
+  for (const std::array<float, 3> at : {std::array{5.0F, 2.0F, 3.0F}, std::array{1.0F, 2.0F, 3.0F}})
+    for (int i = 0; i < 16; ++i)
+      bytes += bytesOf(i == 15 ? 1.0F : i >= 12 ? -diagonal * at[static_cast<std::size_t>(i - 12)] : i % 5 == 0 ? diagonal : 0.0F);
+  std::string text = document(R"({"mesh":0,"skin":0},{"name":"hip","children":[2],"translation":[1,2,3]},{"name":"jaw","translation":[4,0,0]})",
+                              R"({"byteLength":256})", R"(,"skins":[)" + skin + "]");
+  text = replaced(text, R"("scenes":[{"nodes":[0]}])", R"("scenes":[{"nodes":[0,1]}])");
+  text = replaced(text, R"("TEXCOORD_0":2)", R"("TEXCOORD_0":2,"JOINTS_0":3,"WEIGHTS_0":4)");
+  text = replaced(text, R"({"buffer":0,"byteOffset":44,"byteLength":24}])",
+                  R"({"buffer":0,"byteOffset":44,"byteLength":24},{"buffer":0,"byteOffset":68,"byteLength":12},)"
+                  R"({"buffer":0,"byteOffset":80,"byteLength":48},{"buffer":0,"byteOffset":128,"byteLength":128}])");
+  text = replaced(text, R"({"bufferView":2,"componentType":5126,"count":3,"type":"VEC2"}])",
+                  R"({"bufferView":2,"componentType":5126,"count":3,"type":"VEC2"},{"bufferView":3,"componentType":5121,"count":3,"type":"VEC4"},)"
+                  R"({"bufferView":4,"componentType":5126,"count":3,"type":"VEC4"},{"bufferView":5,"componentType":5126,"count":2,"type":"MAT4"}])");
+  return glb(text, bytes);
+}
+
+TEST(Gltf, ASkinIsItsBonesAndWhatHangsOnThem) {
+  const GltfSkin skin = parseGltfSkin(skinnedTriangle({0, 1, 0, 0}, {0.5F, 1.5F, 0.0F, 0.0F}), "m");
+  ASSERT_EQ(skin.joints.size(), 2U);
+  EXPECT_EQ(skin.joints[0].name, "hip");
+  EXPECT_EQ(skin.joints[0].parent, -1);
+  EXPECT_EQ(skin.joints[0].mesh_from_joint.translation(), Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(skin.joints[1].name, "jaw");
+  EXPECT_EQ(skin.joints[1].parent, 0);
+  EXPECT_EQ(skin.joints[1].mesh_from_joint.translation(), Eigen::Vector3d(5, 2, 3));
+  ASSERT_EQ(skin.joint.size(), 3U);
+  for (std::size_t v = 0; v < 3; ++v) {
+    EXPECT_EQ(skin.joint[v][0], 1) << "the file's first joint is the jaw, which comes after its parent here";
+    EXPECT_EQ(skin.joint[v][1], 0);
+    EXPECT_EQ(skin.weight[v], (std::array<float, 4>{0.25F, 0.75F, 0.0F, 0.0F})) << "they add up to 1";
+  }
+  EXPECT_TRUE(parseGltfSkin(glb(document(R"({"mesh":0})"), triangleBytes()), "m").joints.empty());
+}
+
+TEST(Gltf, DamagedSkinsAreRefused) {
+  const auto refusedSkin = [](const std::string& bytes) {
+    return test::complaintOf([&] { parseGltfSkin(bytes, "head.glb"); });
+  };
+  EXPECT_NE(refusedSkin(skinnedTriangle({7, 0, 0, 0}, {1, 0, 0, 0})).find("a joint that the skin has not"), std::string::npos);
+  EXPECT_EQ(refusedSkin(skinnedTriangle({7, 0, 0, 0}, {0, 1, 0, 0})), "") << "it carries nothing";
+  EXPECT_NE(refusedSkin(skinnedTriangle({0, 0, 0, 0}, {-1, 0, 0, 0})).find("weight below 0"), std::string::npos);
+  EXPECT_NE(refusedSkin(skinnedTriangle({0, 0, 0, 0}, {1, 0, 0, 0}, R"({"joints":[2,1],"inverseBindMatrices":5})", 0.0F))
+                .find("has no inverse"),
+            std::string::npos);
+  EXPECT_NE(refusedSkin(skinnedTriangle({0, 0, 0, 0}, {1, 0, 0, 0}, R"({"joints":[9,1]})")).find("node 9, which does not exist"),
+            std::string::npos);
+  EXPECT_NE(refusedSkin(skinnedTriangle({0, 0, 0, 0}, {1, 0, 0, 0}, R"({"joints":[0,1,2],"inverseBindMatrices":5})"))
+                .find("fewer bind matrices than joints"),
+            std::string::npos);
 }
 
 TEST(Gltf, TransformsOfNodesAreAppliedInOrder) {

@@ -1,5 +1,7 @@
 // Characters and performances in other programs' formats.
 #include <cmath>
+#include <functional>
+#include <map>
 #include <numbers>
 
 #include <gtest/gtest.h>
@@ -8,6 +10,7 @@
 #include "retarget/eyes.h"
 #include "retarget/face_deformer.h"
 #include "rig/gltf_document.h"
+#include "rig/gltf_skin.h"
 #include "rig/mesh_io.h"
 #include "tests/retarget/synthetic_rig.h"
 #include "tests/support/test_data.h"
@@ -103,6 +106,65 @@ TEST(Glb, ReadBackItIsTheSameMesh) {
   again.neutral.positions = mesh.positions;
   EXPECT_EQ(rig::parseGltf(formatGlb(again), "m").positions.topRows(kSide * kSide),
             mesh.positions.topRows(kSide * kSide));
+}
+
+TEST(Glb, ASkinComesBackAndLeavesTheFaceAtRestWhereItIs) {
+  const rig::Rig rig = character();
+  rig::GltfSkin skin;
+  const auto joint = [&](const char* name, int parent, double angle, double x) {
+    rig::GltfSkin::Joint out{name, parent, Eigen::Affine3d::Identity()};
+    out.mesh_from_joint.translate(Eigen::Vector3d(x, 0.5 * x, -x));
+    out.mesh_from_joint.rotate(Eigen::AngleAxisd(angle, Eigen::Vector3d(1, 2, 3).normalized()));
+    skin.joints.push_back(out);
+  };
+  joint("spine", -1, 0.3, 0.1);
+  joint("skull", 0, -0.8, 0.4);
+  joint("jaw", 1, 1.1, 0.7);
+  for (std::size_t v = 0; v < rig.neutral.vertexCount(); ++v) {
+    const float w = static_cast<float>(v % 4) / 4;
+    skin.joint.push_back({static_cast<std::uint16_t>(v % 3), 2, 0, 0});
+    skin.weight.push_back({1 - w, w, 0, 0});
+  }
+  const std::string bytes = formatGlb(rig, nullptr, &skin);
+  const rig::GltfSkin back = rig::parseGltfSkin(bytes, "m");
+  ASSERT_EQ(back.joints.size(), 3U);
+  for (std::size_t j = 0; j < 3; ++j) {
+    EXPECT_EQ(back.joints[j].name, skin.joints[j].name);
+    EXPECT_EQ(back.joints[j].parent, skin.joints[j].parent);
+    EXPECT_LT((back.joints[j].mesh_from_joint.matrix() - skin.joints[j].mesh_from_joint.matrix()).cwiseAbs().maxCoeff(),
+              1e-6);
+  }
+  for (std::size_t v = 0; v < kSide * kSide; ++v) {
+    EXPECT_EQ(back.joint[v][0], v % 4 == 0 || v % 3 != 2 ? v % 3 : 2);
+    EXPECT_NEAR(back.weight[v][1], static_cast<float>(v % 4) / 4, 1e-6F);
+  }
+  EXPECT_LT((rig::parseGltf(bytes, "m").positions - rig.neutral.positions).cwiseAbs().maxCoeff(), 1e-6);
+
+  // As any program places it: node upon node, times the bind matrix, leaves a vertex alone.
+  const rig::GltfDocument document = rig::openGltf(bytes, "m", {});
+  ASSERT_EQ(document.model.skins.size(), 1U);
+  const auto bind = rig::readAccessor(document, document.model.skins[0].inverseBindMatrices, 16, 100, "m");
+  std::map<int, Eigen::Affine3d> scene_from_node;
+  const std::function<void(int, const Eigen::Affine3d&)> walk = [&](int number, const Eigen::Affine3d& above) {
+    const tinygltf::Node& node = document.model.nodes[static_cast<std::size_t>(number)];
+    Eigen::Affine3d here = above;
+    if (!node.translation.empty())
+      here.translate(Eigen::Vector3d(node.translation[0], node.translation[1], node.translation[2]));
+    if (!node.rotation.empty())
+      here.rotate(Eigen::Quaterniond(node.rotation[3], node.rotation[0], node.rotation[1], node.rotation[2]));
+    EXPECT_TRUE(node.scale.empty());
+    scene_from_node[number] = here;
+    for (const int child : node.children) walk(child, here);
+  };
+  for (const int root : document.model.scenes[0].nodes) walk(root, Eigen::Affine3d::Identity());
+  const Eigen::Affine3d upright = scene_from_node.at(0);
+  for (std::size_t j = 0; j < 3; ++j) {
+    const Eigen::Matrix4d at_rest = scene_from_node.at(document.model.skins[0].joints[j]).matrix() *
+                                    Eigen::Map<const Eigen::Matrix4d>(bind.data() + 16 * j);
+    EXPECT_LT((at_rest - upright.matrix()).cwiseAbs().maxCoeff(), 1e-6);
+  }
+  skin.joint.pop_back();
+  EXPECT_THROW(formatGlb(rig, nullptr, &skin), std::invalid_argument);
 }
 
 TEST(Glb, SameCharacterSameBytes) { EXPECT_EQ(formatGlb(character()), formatGlb(character())); }
