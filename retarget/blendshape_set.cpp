@@ -8,6 +8,7 @@
 
 #include "retarget/face_deformer.h"
 #include "retarget/shape_relations.h"
+#include "rig/closest_point.h"
 #include "rig/errors.h"
 #include "rig/rigid_motion.h"
 
@@ -45,10 +46,7 @@ std::array<Eigen::Index, kFeaturePointCount> featureVertices(const rig::Rig& rig
   for (std::size_t p = 0; p < kFeaturePointCount; ++p) {
     out[p] = rig.feature_vertex[p];
     if (out[p] < 0)
-      (rig.neutral.positions.rowwise() - rig.feature_positions.row(static_cast<Eigen::Index>(p)))
-          .rowwise()
-          .squaredNorm()
-          .minCoeff(&out[p]);
+      out[p] = rig::nearestVertex(rig.neutral.positions, rig.feature_positions.row(static_cast<Eigen::Index>(p)));
   }
   return out;
 }

@@ -4,6 +4,13 @@
 #include <numeric>
 
 namespace volto::rig {
+
+Eigen::Index nearestVertex(const VertexPositions& positions, const Eigen::RowVector3d& p) {
+  Eigen::Index nearest = 0;
+  (positions.rowwise() - p).rowwise().squaredNorm().minCoeff(&nearest);
+  return nearest;
+}
+
 namespace {
 
 double boxDistance2(const Eigen::Vector3d& p, const Eigen::Vector3d& low, const Eigen::Vector3d& high) {

@@ -18,6 +18,9 @@ struct SurfacePoint {
   double distance = std::numeric_limits<double>::infinity();
 };
 
+// The row of `positions` (not empty) that is nearest to `p`.
+Eigen::Index nearestVertex(const VertexPositions& positions, const Eigen::RowVector3d& p);
+
 // The nearest point of one triangle; a degenerate one counts as its longest edge.
 SurfacePoint closestPointOnTriangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                                     const Eigen::Vector3d& c);

@@ -1,12 +1,11 @@
 #include "rig/mesh_io.h"
 
-#include "rig/gltf_skin.h"
-
 #include <charconv>
 #include <map>
 #include <stdexcept>
 
 #include "rig/file_bytes.h"
+#include "rig/gltf_skin.h"
 #include "rig/mesh_builder.h"
 #include "rig/mtl_reader.h"
 #include "rig/obj_reader.h"

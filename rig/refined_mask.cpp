@@ -2,6 +2,8 @@
 
 #include <stdexcept>
 
+#include "rig/closest_point.h"
+
 namespace volto::rig {
 namespace {
 
@@ -36,7 +38,7 @@ VertexPositions pointDisplacements(const RefinedMask& mask, const VertexPosition
   VertexPositions out(static_cast<Eigen::Index>(mask.pointCount()), 3);
   for (std::size_t p = 0; p < mask.pointCount(); ++p) {
     Eigen::Index v = mask.vertex[p];
-    if (v < 0) (neutral.rowwise() - mask.positions.row(static_cast<Eigen::Index>(p))).rowwise().squaredNorm().minCoeff(&v);
+    if (v < 0) v = nearestVertex(neutral, mask.positions.row(static_cast<Eigen::Index>(p)));
     out.row(static_cast<Eigen::Index>(p)) = vertices.row(v);
   }
   return out;

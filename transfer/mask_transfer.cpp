@@ -1,5 +1,6 @@
 #include "transfer/mask_transfer.h"
 
+#include "rig/closest_point.h"
 #include "rig/fapu.h"
 
 namespace volto::transfer {
@@ -16,8 +17,7 @@ Eigen::Vector3d scaleAt(const rig::Rig& rig, const MaskPlace& place) {
 // The vertex that stands for a point of the mask: its own, or the nearest to a free position.
 std::uint32_t vertexOf(const rig::RefinedMask& mask, std::size_t point, const rig::VertexPositions& neutral) {
   Eigen::Index v = mask.vertex[point];
-  if (v < 0)
-    (neutral.rowwise() - mask.positions.row(static_cast<Eigen::Index>(point))).rowwise().squaredNorm().minCoeff(&v);
+  if (v < 0) v = rig::nearestVertex(neutral, mask.positions.row(static_cast<Eigen::Index>(point)));
   return static_cast<std::uint32_t>(v);
 }
 
