@@ -148,6 +148,7 @@ Correspondence correspondThroughGenericHead(const rig::Rig& source, const rig::R
   Correspondence c;
   const std::size_t triangle_count = rig::triangulate(target.neutral).size();
   c.source_triangle.assign(triangle_count, Correspondence::kNone);
+  c.source_place.resize(triangle_count);
   c.source_point.resize(target.neutral.vertexCount());
   // Outwards, as the skin's triangles have it.
   rig::VertexPositions normal = rig::VertexPositions::Zero(target.neutral.positions.rows(), 3);
@@ -171,9 +172,10 @@ Correspondence correspondThroughGenericHead(const rig::Rig& source, const rig::R
                                       target.neutral.positions.row(t[2])) /
                                      3;
       const auto hit = follow(middle, normalOf(target.neutral.positions, t));
-      if (hit)
-        c.source_triangle[static_cast<std::size_t>(target_skin.index[s])] =
-            source_skin.index[static_cast<std::size_t>(hit->triangle)];
+      if (!hit) continue;
+      const auto index = static_cast<std::size_t>(target_skin.index[s]);
+      c.source_triangle[index] = source_skin.index[static_cast<std::size_t>(hit->triangle)];
+      c.source_place[index] = {on_source.triangle(hit->triangle), hit->barycentric};
     }
   });
   return c;

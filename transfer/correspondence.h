@@ -11,7 +11,7 @@
 namespace volto::transfer {
 
 // For the skin of the face, up to a third of an eye separation beyond the control mask; elsewhere, inside the mouth and
-// on separate parts there is none (kNone, no weights). Only source_triangle and source_point are filled. Fits the
+// on separate parts there is none (kNone, no weights). Only source_triangle, source_place and source_point are filled. Fits the
 // generic head to both (some 1.5 s for two heads on two cores). Throws rig::InputError when the points are on no face.
 Correspondence correspondThroughGenericHead(const rig::Rig& source, const rig::Rig& target);
 

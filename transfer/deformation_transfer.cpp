@@ -39,13 +39,22 @@ Eigen::Vector3d at(const rig::VertexPositions& positions, const SurfacePoint& p)
 
 bool isNone(const SurfacePoint& p) { return p.weight[0] == 0 && p.weight[1] == 0 && p.weight[2] == 0; }
 
-// A triangle of the target: the gradients of its three corners' hat functions, times the root of nothing: area kept
-// apart.
+// A triangle of the target.
 struct TargetTriangle {
-  Triangle vertex;  // welded
-  std::array<Eigen::Vector3d, 3> gradient;
-  double area;
-  std::int32_t source;
+  Triangle vertex;                // welded
+  std::int32_t source;            // whose change of gradient it takes; kNone: stays as it is
+  bool between_vertices = false;  // takes it from `place` instead
+  SurfacePoint place;
+  // Times the change of the source's frame, or of its gradient at `place`, the right-hand side of corners 1 and 2: area
+  // times the gradients of their hat functions, in the coordinates of that frame.
+  Eigen::Vector3d second, third;
+};
+
+// How one example differs from the source at rest.
+struct Change {
+  std::vector<bool> vertex_moved, triangle_moved;
+  std::vector<Eigen::Matrix3d> frame;     // one per source triangle that is needed and moved
+  std::vector<Eigen::Matrix3d> gradient;  // one per source vertex, mean of the triangles around; where it is needed
 };
 
 }  // namespace
@@ -53,7 +62,12 @@ struct TargetTriangle {
 struct DeformationTransfer::State {
   rig::VertexPositions source_neutral, target_neutral;
   std::vector<Triangle> source_triangles;
-  std::vector<Eigen::Matrix3d> source_inverse;  // of the frames at rest; zero for a degenerate triangle
+  std::vector<bool> source_needed;              // one per source triangle
+  std::vector<Eigen::Matrix3d> source_frame;    // at rest
+  std::vector<Eigen::Matrix3d> source_inverse;  // of them; zero for a degenerate triangle
+  // Source triangles around each vertex and their shares of its gradient; empty where no place is between vertices.
+  std::vector<std::uint32_t> around_start, around;
+  std::vector<double> around_share;
   std::vector<TargetTriangle> triangles;
   std::vector<std::uint32_t> same_as;
   std::vector<std::int32_t> unknown;  // #V of the target: row in the system
@@ -74,13 +88,35 @@ struct DeformationTransfer::State {
     return r * (scale.asDiagonal() * (r.transpose() * turned));
   }
 
-  // Adds one example to columns 3k, 3k+1, 3k+2 of a panel.
+  void measure(const rig::VertexPositions& example, Change& change) const {
+    change.vertex_moved.resize(static_cast<std::size_t>(source_neutral.rows()));
+    for (std::size_t v = 0; v < change.vertex_moved.size(); ++v) {
+      const auto row = static_cast<Eigen::Index>(v);
+      change.vertex_moved[v] = example.row(row) != source_neutral.row(row);
+    }
+    change.triangle_moved.resize(source_triangles.size());
+    change.frame.resize(source_triangles.size());
+    for (std::size_t s = 0; s < source_triangles.size(); ++s) {
+      const Triangle& t = source_triangles[s];
+      change.triangle_moved[s] =
+          source_needed[s] && (change.vertex_moved[t[0]] || change.vertex_moved[t[1]] || change.vertex_moved[t[2]]);
+      if (change.triangle_moved[s]) change.frame[s] = frameOf(example, t) - source_frame[s];
+    }
+    if (around_start.empty()) return;
+    change.gradient.resize(change.vertex_moved.size());
+    for (std::size_t v = 0; v + 1 < around_start.size(); ++v) {
+      change.gradient[v].setZero();
+      for (std::uint32_t e = around_start[v]; e < around_start[v + 1]; ++e)
+        if (change.triangle_moved[around[e]])
+          change.gradient[v] += around_share[e] * (change.frame[around[e]] * source_inverse[around[e]]);
+    }
+  }
+
+  // Adds one example to columns 3k, 3k+1, 3k+2 of a panel: what it changes of the right-hand side at rest.
   void addRightHandSide(const rig::VertexPositions& example, std::size_t k, std::vector<double>& panel,
-                        std::vector<Eigen::Matrix3d>& gradients) const {
+                        Change& change) const {
     const Eigen::Matrix3d& r = correspondence.target_from_source;
-    gradients.resize(source_triangles.size());
-    for (std::size_t s = 0; s < source_triangles.size(); ++s)
-      gradients[s] = r * (frameOf(example, source_triangles[s]) * source_inverse[s]) * r.transpose();
+    measure(example, change);
     const auto add = [&](std::uint32_t vertex, const Eigen::Vector3d& value) {
       double* const row = panel.data() + static_cast<std::size_t>(unknown[vertex]) * SparseCholesky::kPanel + 3 * k;
       row[0] += value.x();
@@ -88,25 +124,35 @@ struct DeformationTransfer::State {
       row[2] += value.z();
     };
     for (const TargetTriangle& t : triangles) {
-      for (int i = 0; i < 3; ++i) {
-        const Eigen::Vector3d weighted = t.area * t.gradient[i];
-        add(t.vertex[i],
-            t.source < 0 ? weighted : Eigen::Vector3d(gradients[static_cast<std::size_t>(t.source)] * weighted));
+      Eigen::Matrix3d turned;
+      if (t.between_vertices) {
+        turned.setZero();
+        for (std::size_t i = 0; i < 3; ++i) turned += t.place.weight[i] * change.gradient[t.place.vertex[i]];
+        turned = r * turned;
+      } else if (t.source >= 0 && change.triangle_moved[static_cast<std::size_t>(t.source)]) {
+        turned = r * change.frame[static_cast<std::size_t>(t.source)];
+      } else {
+        continue;
       }
+      const Eigen::Vector3d second = turned * t.second, third = turned * t.third;
+      add(t.vertex[0], -(second + third));
+      add(t.vertex[1], second);
+      add(t.vertex[2], third);
     }
     for (std::size_t u = 0; u < vertex_of_unknown.size(); ++u) {
       const std::uint32_t v = vertex_of_unknown[u];
-      Eigen::Vector3d goal = target_neutral.row(v);
       const SurfacePoint& on_source = correspondence.source_point[v];
-      if (!isNone(on_source)) goal += scaled(at(example, on_source) - at(source_neutral, on_source), v);
-      add(v, anchor[u] * goal);
+      if (!change.vertex_moved[on_source.vertex[0]] && !change.vertex_moved[on_source.vertex[1]] &&
+          !change.vertex_moved[on_source.vertex[2]])
+        continue;
+      if (isNone(on_source)) continue;
+      add(v, anchor[u] * scaled(at(example, on_source) - at(source_neutral, on_source), v));
     }
     for (std::size_t p = 0; p < pairs.size(); ++p) {
       const SlitPair& pair = pairs[p];
-      const Eigen::Vector3d rest = at(target_neutral, pair.target_upper) - at(target_neutral, pair.target_lower);
       const Eigen::Vector3d source_rest = at(source_neutral, pair.source_upper) - at(source_neutral, pair.source_lower);
       const Eigen::Vector3d source_now = at(example, pair.source_upper) - at(example, pair.source_lower);
-      const Eigen::Vector3d gap = rest + pair.gap_scale * (r * (source_now - source_rest));
+      const Eigen::Vector3d gap = pair.gap_scale * (r * (source_now - source_rest));
       for (int i = 0; i < 3; ++i) {
         add(same_as[pair.target_upper.vertex[i]], pair_stiffness[p] * pair.target_upper.weight[i] * gap);
         add(same_as[pair.target_lower.vertex[i]], -pair_stiffness[p] * pair.target_lower.weight[i] * gap);
@@ -116,17 +162,49 @@ struct DeformationTransfer::State {
 
   void solvePanel(std::span<const rig::VertexPositions> examples, std::span<rig::VertexPositions> results) const {
     std::vector<double> panel(system->size() * SparseCholesky::kPanel, 0.0), scratch;
-    std::vector<Eigen::Matrix3d> gradients;
-    for (std::size_t k = 0; k < examples.size(); ++k) addRightHandSide(examples[k], k, panel, gradients);
+    Change change;
+    for (std::size_t k = 0; k < examples.size(); ++k) addRightHandSide(examples[k], k, panel, change);
     system->solve(panel, scratch);
     for (std::size_t k = 0; k < examples.size(); ++k) {
       results[k].resize(target_neutral.rows(), 3);
       for (std::size_t v = 0; v < same_as.size(); ++v) {
         const double* const row =
             panel.data() + static_cast<std::size_t>(unknown[same_as[v]]) * SparseCholesky::kPanel + 3 * k;
-        results[k].row(static_cast<Eigen::Index>(v)) << row[0], row[1], row[2];
+        results[k].row(static_cast<Eigen::Index>(v)) =
+            target_neutral.row(static_cast<Eigen::Index>(v)) + Eigen::RowVector3d(row[0], row[1], row[2]);
       }
     }
+  }
+
+  // The triangles around every vertex that some place lies beside, by area.
+  void gatherAround() {
+    std::vector<bool> wanted(static_cast<std::size_t>(source_neutral.rows()), false);
+    bool any = false;
+    for (const TargetTriangle& t : triangles)
+      if (t.between_vertices)
+        for (const std::uint32_t v : t.place.vertex) any = wanted[v] = true;
+    if (!any) return;
+    around_start.assign(wanted.size() + 1, 0);
+    const auto twiceArea = [&](std::size_t s) { return source_frame[s].col(2).squaredNorm(); };
+    std::vector<double> total(wanted.size(), 0.0);
+    const auto counts = [&](std::size_t s, std::uint32_t v) { return wanted[v] && !source_inverse[s].isZero(0); };
+    for (std::size_t s = 0; s < source_triangles.size(); ++s)
+      for (const std::uint32_t v : source_triangles[s])
+        if (counts(s, v)) {
+          ++around_start[v + 1];
+          total[v] += twiceArea(s);
+          source_needed[s] = true;
+        }
+    for (std::size_t v = 0; v < wanted.size(); ++v) around_start[v + 1] += around_start[v];
+    around.resize(around_start.back());
+    around_share.resize(around_start.back());
+    std::vector<std::uint32_t> next(around_start.begin(), around_start.end() - 1);
+    for (std::size_t s = 0; s < source_triangles.size(); ++s)
+      for (const std::uint32_t v : source_triangles[s])
+        if (counts(s, v)) {
+          around[next[v]] = static_cast<std::uint32_t>(s);
+          around_share[next[v]++] = twiceArea(s) / total[v];
+        }
   }
 };
 
@@ -152,6 +230,7 @@ DeformationTransfer::DeformationTransfer(const rig::VertexPositions& source_neut
   if (correspondence.source_triangle.size() != target_triangles.size() ||
       correspondence.source_point.size() != vertices || (!same_as.empty() && same_as.size() != vertices) ||
       !(eye_separation > 0) ||
+      (!correspondence.source_place.empty() && correspondence.source_place.size() != target_triangles.size()) ||
       (!correspondence.anchor_share.empty() && correspondence.anchor_share.size() != vertices) ||
       (correspondence.displacement_scale.size() > 1 && correspondence.displacement_scale.size() != vertices))
     throw std::invalid_argument("DeformationTransfer: sizes do not fit together");
@@ -167,10 +246,13 @@ DeformationTransfer::DeformationTransfer(const rig::VertexPositions& source_neut
       options.threads > 0 ? options.threads : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
 
   s.source_inverse.resize(source_triangles.size());
+  s.source_frame.resize(source_triangles.size());
+  s.source_needed.assign(source_triangles.size(), false);
   std::vector<bool> source_degenerate(source_triangles.size(), false);
   for (std::size_t t = 0; t < source_triangles.size(); ++t) {
     const Eigen::Matrix3d frame = frameOf(source_neutral, source_triangles[t]);
     const double size = frame.col(0).norm() * frame.col(1).norm();
+    s.source_frame[t] = frame;
     source_degenerate[t] = !(frame.col(2).squaredNorm() > 1e-9 * size);  // |normal|^2 is twice the area
     if (source_degenerate[t])
       s.source_inverse[t].setZero();
@@ -194,21 +276,31 @@ DeformationTransfer::DeformationTransfer(const rig::VertexPositions& source_neut
     const Eigen::Matrix3d frame = frameOf(target_neutral, t.vertex);
     if (!(frame.col(2).squaredNorm() > 1e-9 * frame.col(0).norm() * frame.col(1).norm())) continue;
     const Eigen::Matrix3d inverse = frame.inverse();
-    t.gradient[1] = inverse.row(0);
-    t.gradient[2] = inverse.row(1);
-    t.gradient[0] = -(t.gradient[1] + t.gradient[2]);
-    t.area = 0.5 * frame.col(2).squaredNorm();
+    const std::array<Eigen::Vector3d, 3> gradient = {-(inverse.row(0) + inverse.row(1)).transpose(), inverse.row(0),
+                                                     inverse.row(1)};
+    const double t_area = 0.5 * frame.col(2).squaredNorm();
     t.source = s.correspondence.source_triangle[i];
     if (t.source >= 0 && source_degenerate[static_cast<std::size_t>(t.source)]) t.source = Correspondence::kNone;
+    if (!s.correspondence.source_place.empty()) t.place = s.correspondence.source_place[i];
+    t.between_vertices = !isNone(t.place);
+    Eigen::Matrix3d to_source = s.correspondence.target_from_source.transpose();
+    if (t.between_vertices)
+      t.source = Correspondence::kNone;
+    else if (t.source >= 0)
+      to_source = s.source_inverse[static_cast<std::size_t>(t.source)] * to_source;
+    if (t.source >= 0) s.source_needed[static_cast<std::size_t>(t.source)] = true;
+    t.second = t_area * (to_source * gradient[1]);
+    t.third = t_area * (to_source * gradient[2]);
     for (int a = 0; a < 3; ++a) {
-      area[static_cast<std::size_t>(s.unknown[t.vertex[a]])] += t.area / 3;
+      area[static_cast<std::size_t>(s.unknown[t.vertex[a]])] += t_area / 3;
       for (int b = 0; b < 3; ++b) {
         const std::int32_t row = s.unknown[t.vertex[a]], column = s.unknown[t.vertex[b]];
-        if (row >= column) entries.emplace_back(row, column, t.area * t.gradient[a].dot(t.gradient[b]));
+        if (row >= column) entries.emplace_back(row, column, t_area * gradient[a].dot(gradient[b]));
       }
     }
     s.triangles.push_back(t);
   }
+  s.gatherAround();
   double mean_area = 0;
   for (const double a : area) mean_area += a / static_cast<double>(area.size());
   const double unit = 1 / (eye_separation * eye_separation);

@@ -30,6 +30,10 @@ struct Correspondence {
   static constexpr std::int32_t kNone = -1;
   std::vector<std::int32_t>
       source_triangle;  // one per triangle of rig::triangulate(target): index into rig::triangulate(source), or kNone
+  // One per target triangle, or none: where on the source it takes its deformation, between the means around the
+  // source's vertices; without weights: from source_triangle. For meshes of unlike density: triangle by triangle, a
+  // fine target would show the facets of a coarse source.
+  std::vector<SurfacePoint> source_place;
   std::vector<SurfacePoint>
       source_point;  // one per target vertex; all weights zero: none, the vertex is anchored where it is
   // How firmly each target vertex is held where its displacement puts it, as a share of the anchor: 0 follows its

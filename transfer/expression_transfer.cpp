@@ -6,9 +6,12 @@
 #include <optional>
 #include <stdexcept>
 
+#include <Eigen/Geometry>
+
 #include "rig/contacts.h"
 #include "rig/parallel.h"
 #include "rig/weld.h"
+#include "transfer/closing.h"
 #include "transfer/correspondence.h"
 #include "transfer/lining.h"
 #include "transfer/mask_transfer.h"
@@ -28,18 +31,22 @@ std::vector<Float3> toFloat(const rig::VertexPositions& p) {
   return out;
 }
 
+rig::VertexPositions difference(const std::vector<Float3>& before, const std::vector<Float3>& after) {
+  rig::VertexPositions moved(static_cast<Eigen::Index>(before.size()), 3);
+  for (std::size_t v = 0; v < after.size(); ++v)
+    for (std::size_t k = 0; k < 3; ++k)
+      moved(static_cast<Eigen::Index>(v), static_cast<Eigen::Index>(k)) =
+          static_cast<double>(after[v][k]) - static_cast<double>(before[v][k]);
+  return moved;
+}
+
 // What resolveContacts moves, in double precision.
 rig::VertexPositions outOfContact(const rig::Contacts& contacts, const std::vector<Float3>& neutral,
                                   const rig::VertexPositions& positions) {
   const std::vector<Float3> before = toFloat(positions);
   std::vector<Float3> after = before;
   rig::resolveContacts(contacts, neutral, after);
-  rig::VertexPositions moved(positions.rows(), 3);
-  for (std::size_t v = 0; v < after.size(); ++v)
-    for (std::size_t k = 0; k < 3; ++k)
-      moved(static_cast<Eigen::Index>(v), static_cast<Eigen::Index>(k)) =
-          static_cast<double>(after[v][k]) - static_cast<double>(before[v][k]);
-  return moved;
+  return difference(before, after);
 }
 
 bool isNone(const SurfacePoint& p) { return p.weight[0] == 0 && p.weight[1] == 0 && p.weight[2] == 0; }
@@ -94,6 +101,7 @@ struct ExpressionTransfer::State {
   MaskTransfer mask;
   std::optional<PartTransfer> parts;  // where the meshes differ
   std::optional<Lining> lining;       // there too
+  rig::Contacts contacts;             // the target's
   std::optional<DeformationTransfer> deformation;
   Eigen::Matrix3d source_from_target = Eigen::Matrix3d::Identity();
   std::vector<Float3> source_neutral, target_neutral;
@@ -107,7 +115,10 @@ struct ExpressionTransfer::State {
         mask(s, t),
         source_neutral(toFloat(s.neutral.positions)),
         target_neutral(toFloat(t.neutral.positions)) {
-    if (!same) parts.emplace(s, t);
+    contacts = t.contacts;
+    if (same) return;
+    parts.emplace(s, t);
+    guardSkin(weldOf(t));
   }
 
   // The source's vertices, and after them the target's as the mask has them, turned into the source's frame: what of
@@ -119,11 +130,44 @@ struct ExpressionTransfer::State {
     return all;
   }
 
+  // Every triangle of the target's skin, to be brought back when it turns over: what other shapes than its own may do.
+  void guardSkin(std::span<const std::uint32_t> weld) {
+    std::vector<bool> part(target_neutral.size(), false);
+    for (const rig::RigidPart& p : target.rigid_parts)
+      for (const std::uint32_t v : p.vertices) part[v] = true;
+    contacts.folds = {};
+    const double least = 1e-9 * target.fapu.fapu.eye_separation * target.fapu.fapu.eye_separation;
+    for (const Triangle& t : rig::triangulate(target.neutral)) {
+      if (part[t[0]]) continue;
+      const Triangle welded = {weld[t[0]], weld[t[1]], weld[t[2]]};
+      const Eigen::Vector3d a = target.neutral.positions.row(welded[0]), b = target.neutral.positions.row(welded[1]),
+                            d = target.neutral.positions.row(welded[2]);
+      const Eigen::Vector3d normal = (b - a).cross(d - a);
+      if (!(normal.norm() > least)) continue;
+      const Eigen::Vector3f unit = normal.normalized().cast<float>();
+      contacts.folds.triangle.push_back(welded);
+      contacts.folds.normal.push_back({unit.x(), unit.y(), unit.z()});
+      contacts.folds.least.push_back(static_cast<float>(0.01 * normal.norm()));
+    }
+    contacts.folds.watched = contacts.folds.triangle.size();
+    for (std::uint32_t v = 0; v < weld.size(); ++v)
+      if (weld[v] != v && target_neutral[v] == target_neutral[weld[v]]) contacts.folds.copies.push_back({v, weld[v]});
+  }
+
   // Lids along the eyeball, lips and lids on their own side. On the same mesh, what the artist let pass on the source
   // may pass on the target: an example's own lids lie on its eyeball as closely as it was made.
   void resolve(const rig::VertexPositions& example, rig::VertexPositions& result) const {
-    if (target.contacts.empty()) return;
-    rig::VertexPositions moved = outOfContact(target.contacts, target_neutral, result);
+    if (contacts.empty()) return;
+    // What unfolds may open again by a little.
+    constexpr int kTimes = 3;
+    for (int time = 0; !same && time < kTimes; ++time) {
+      const std::vector<Float3> before = toFloat(result);
+      std::vector<Float3> closed = before;
+      closeAsSource(source, source_neutral, toFloat(example), target, target_neutral, closed);
+      result += difference(before, closed);
+      if (time + 1 < kTimes) result += outOfContact(contacts, target_neutral, result);
+    }
+    rig::VertexPositions moved = outOfContact(contacts, target_neutral, result);
     if (same && !source.contacts.empty()) {
       const rig::VertexPositions allowed = outOfContact(source.contacts, source_neutral, example);
       const double size = target.fapu.fapu.eye_separation / source.fapu.fapu.eye_separation;
@@ -159,8 +203,12 @@ struct ExpressionTransfer::State {
       const auto offset = static_cast<std::uint32_t>(source.neutral.vertexCount());
       for (const Triangle& t : target_triangles) all_triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
       all_positions = stacked(source.neutral.positions, target.neutral.positions);
+      // What the face encloses hangs between its rims like a sheet of rubber: the mask's points lie on the lips, and
+      // what they would make of palate and cheeks behind tears them.
+      const auto inside = [&](std::uint32_t v) { return enclosed[v]; };
       for (std::size_t t = 0; t < target_triangles.size(); ++t)
-        if (c.source_triangle[t] < 0) c.source_triangle[t] = static_cast<std::int32_t>(source_triangles.size() + t);
+        if (c.source_triangle[t] < 0 && std::none_of(target_triangles[t].begin(), target_triangles[t].end(), inside))
+          c.source_triangle[t] = static_cast<std::int32_t>(source_triangles.size() + t);
       for (std::uint32_t v = 0; v < c.source_point.size(); ++v) {
         if (!isNone(c.source_point[v])) continue;
         c.source_point[v] = {{offset + v, offset + v, offset + v}, {1, 0, 0}};

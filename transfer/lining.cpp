@@ -1,5 +1,6 @@
 #include "transfer/lining.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <Eigen/Geometry>
@@ -10,8 +11,9 @@ namespace volto::transfer {
 namespace {
 
 constexpr double kDeepestEs = 0.2;
-constexpr double kLeastForward = 0.5;  // cosine between the skin's normal and the face's direction
-constexpr double kNearest = 0.1;       // of the depth at rest
+constexpr double kLeastForward = 0.2;  // cosine between the skin's normal and the face's direction
+constexpr double kLeastReachEs = 0.02;
+constexpr double kNearest = 0.5;  // of the depth at rest
 
 Eigen::Vector3d normalOf(const rig::VertexPositions& p, const std::array<std::uint32_t, 3>& t) {
   const Eigen::Vector3d a = p.row(t[0]), b = p.row(t[1]), c = p.row(t[2]);
@@ -41,6 +43,7 @@ Lining::Lining(const rig::Rig& rig, const std::vector<bool>& inside, std::vector
     Eigen::Vector3d place = Eigen::Vector3d::Zero();
     for (std::size_t i = 0; i < 3; ++i) place += lining.weight[i] * neutral.row(lining.skin[i]).transpose();
     lining.depth = -lining.side * normal.dot(here - place);
+    lining.reach = std::max(lining.depth, kLeastReachEs * rig.fapu.fapu.eye_separation);
     if (lining.depth > 0.5 * on.distance && lining.depth > 0) vertices_.push_back(lining);
   }
 }
@@ -50,8 +53,13 @@ void Lining::keepBehind(rig::VertexPositions& positions) const {
     Eigen::Vector3d place = Eigen::Vector3d::Zero();
     for (std::size_t i = 0; i < 3; ++i) place += l.weight[i] * positions.row(l.skin[i]).transpose();
     const Eigen::Vector3d outwards = l.side * normalOf(positions, l.skin);
-    const double depth = -outwards.dot(positions.row(l.vertex).transpose() - place);
-    if (depth < kNearest * l.depth) positions.row(l.vertex) -= ((kNearest * l.depth - depth) * outwards).transpose();
+    const Eigen::Vector3d off = positions.row(l.vertex).transpose() - place;
+    const double depth = -outwards.dot(off);
+    if (depth >= kNearest * l.depth) continue;
+    // Only what is still behind it: the inside of an upper lip lies behind the lower one until the jaw opens.
+    const double aside = (off + depth * outwards).norm();
+    const double share = std::clamp(2 - aside / l.reach, 0.0, 1.0);
+    positions.row(l.vertex) -= (share * (kNearest * l.depth - depth) * outwards).transpose();
   }
 }
 

@@ -17,7 +17,7 @@ class Lining {
   // the eye separation behind the skin, or not behind skin that faces forward, is left alone.
   Lining(const rig::Rig& rig, const std::vector<bool>& inside, std::vector<std::array<std::uint32_t, 3>> skin);
 
-  // Moves lining that came through the skin back behind it, to a tenth of its distance at rest.
+  // Moves lining that came through the skin back behind it, to half of its distance at rest.
   void keepBehind(rig::VertexPositions& positions) const;
 
   std::size_t size() const { return vertices_.size(); }
@@ -28,6 +28,7 @@ class Lining {
     std::array<std::uint32_t, 3> skin{};
     std::array<double, 3> weight{};
     double depth = 0;  // at rest, > 0
+    double reach = 0;  // > 0: further aside than this, and less and less up to twice as far, it is no longer behind it
     double side = 1;   // of the triangle's normal: 1 when it looks out of the face
   };
   std::vector<Vertex> vertices_;

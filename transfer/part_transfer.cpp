@@ -1,5 +1,8 @@
 #include "transfer/part_transfer.h"
 
+#include <algorithm>
+#include <string>
+
 #include <Eigen/Geometry>
 
 #include "rig/closest_point.h"
@@ -7,6 +10,8 @@
 
 namespace volto::transfer {
 namespace {
+
+constexpr double kHoldsTeethEs = 0.03;
 
 // Two axes in the triangle, one off it; orthonormal, so that lashes do not stretch with the lid.
 Eigen::Matrix3d frameOf(const rig::VertexPositions& p, const std::array<std::uint32_t, 3>& t) {
@@ -34,6 +39,45 @@ PartTransfer::PartTransfer(const rig::Rig& source, const rig::Rig& target) : sou
     for (const auto& [rig, out] : {std::pair{&source, &t.source}, std::pair{&target, &t.target}})
       for (const rig::RigidPart& part : rig->rigid_parts)
         if (part.follows == follows) out->insert(out->end(), part.vertices.begin(), part.vertices.end());
+    // Artists often open the jaw and leave the tongue behind: the jaw is where its teeth are.
+    t.middle = t.target;
+    const auto teethOf = [&](const rig::Rig& rig) {
+      std::vector<std::uint32_t> out;
+      for (const rig::RigidPart& part : rig.rigid_parts)
+        if (part.follows == Follows::jaw && part.name.find("teeth") != std::string::npos)
+          out.insert(out.end(), part.vertices.begin(), part.vertices.end());
+      return out;
+    };
+    if (follows == Follows::jaw) {
+      std::vector<std::uint32_t> on_source = teethOf(source), on_target = teethOf(target);
+      if (on_source.size() >= 3 && !on_target.empty()) {
+        t.source = std::move(on_source);
+        t.middle = std::move(on_target);
+      }
+    }
+    t.share.assign(t.target.size(), 1.0);
+    // Gums of both jaws in one piece go along by what is near the lower teeth (rig/rigid_parts.h); what holds the
+    // teeth goes as they do.
+    for (const rig::PartMotion& motion : target.part_motions) {
+      if (motion.follows != follows) continue;
+      std::vector<double> share(target.neutral.vertexCount(), 1.0);
+      for (std::size_t i = 0; i < motion.vertices.size(); ++i)
+        share[motion.vertices[i]] = static_cast<double>(motion.share[i]);
+      const double near = kHoldsTeethEs * target.fapu.fapu.eye_separation;
+      double sum = 0, count = 0;
+      for (const std::uint32_t v : t.target) {
+        if (share[v] >= 1) continue;
+        const Eigen::RowVector3d here = target.neutral.positions.row(v);
+        const bool holds = std::any_of(t.middle.begin(), t.middle.end(), [&](std::uint32_t tooth) {
+          return share[tooth] == 1 && (target.neutral.positions.row(tooth) - here).squaredNorm() < near * near;
+        });
+        if (!holds) continue;
+        sum += share[v];
+        ++count;
+      }
+      const double full = sum > 0 ? sum / count : 1.0;
+      for (std::size_t i = 0; i < t.target.size(); ++i) t.share[i] = std::min(1.0, share[t.target[i]] / full);
+    }
     if (t.source.size() >= 3 && !t.target.empty()) turning_.push_back(std::move(t));
   }
   std::vector<bool> part(target.neutral.vertexCount(), false);
@@ -70,10 +114,13 @@ void PartTransfer::apply(const rig::VertexPositions& example, rig::VertexPositio
     const Eigen::Matrix3d rotation = turn * on_source.rotation * turn.transpose();
     const Eigen::Vector3d shift = size * (turn * on_source.shift);
     Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-    for (const std::uint32_t v : t.target)
-      centre += target_.neutral.positions.row(v).transpose() / static_cast<double>(t.target.size());
-    for (const std::uint32_t v : t.target)
-      result.row(v) = (rotation * (target_.neutral.positions.row(v).transpose() - centre) + centre + shift).transpose();
+    for (const std::uint32_t v : t.middle)
+      centre += target_.neutral.positions.row(v).transpose() / static_cast<double>(t.middle.size());
+    for (std::size_t i = 0; i < t.target.size(); ++i) {
+      const Eigen::Vector3d rest = target_.neutral.positions.row(t.target[i]);
+      const Eigen::Vector3d moved = rotation * (rest - centre) + centre + shift;
+      result.row(t.target[i]) = (rest + t.share[i] * (moved - rest)).transpose();
+    }
   }
   for (const Rider& r : riders_)
     result.row(r.vertex) = (at(result, r.on, r.weight) + frameOf(result, r.on) * r.offset).transpose();

@@ -20,6 +20,8 @@ class PartTransfer {
  private:
   struct Turning {
     std::vector<std::uint32_t> source, target;
+    std::vector<std::uint32_t> middle;  // of the target: what answers to `source`
+    std::vector<double> share;          // one per vertex of the target, 0..1: of the motion
   };
   // A vertex in the frame of a triangle of skin.
   struct Rider {

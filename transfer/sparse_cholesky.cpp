@@ -1,6 +1,7 @@
 #include "transfer/sparse_cholesky.h"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include <Eigen/SparseCholesky>
@@ -27,7 +28,9 @@ __attribute__((target_clones("arch=haswell", "default")))
 void solveTriangles(const FactorView& l, double* __restrict x) {
   for (std::size_t j = 0; j < l.size; ++j) {
     double* const xj = x + j * kWidth;
-    for (std::size_t k = 0; k < kWidth; ++k) xj[k] *= l.inverse_diagonal[j];
+    double moved = 0;  // expressions are local: most rows of a right-hand side are zero
+    for (std::size_t k = 0; k < kWidth; ++k) moved += std::abs(xj[k] *= l.inverse_diagonal[j]);
+    if (moved == 0) continue;
     for (std::int32_t e = l.column_start[j]; e < l.column_start[j + 1]; ++e) {
       double* const xi = x + static_cast<std::size_t>(l.rows[e]) * kWidth;
       const double value = l.values[e];

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "rig/build_rig.h"
+#include "rig/contacts.h"
 #include "rig/mesh_io.h"
 #include "tests/rig/test_head.h"
 #include "tests/support/test_data.h"
@@ -88,6 +89,43 @@ TEST(ExpressionTransfer, EyesCloseOnAHeadOfAnotherTopology) {
   EXPECT_GT(gap("3.1", "3.3", target.neutral.positions), 0.12);
   EXPECT_LT(gap("3.1", "3.3", result[0]), 0.04);
   EXPECT_NEAR(gap("3.2", "3.4", result[0]), gap("3.2", "3.4", target.neutral.positions), 0.02);
+  // In every column from corner to corner, as the contacts see it.
+  const auto widest = [&](rig::SlitContact::Place place, const rig::VertexPositions& at) {
+    std::vector<std::array<float, 3>> positions;
+    for (Eigen::Index v = 0; v < at.rows(); ++v)
+      positions.push_back({static_cast<float>(at(v, 0)), static_cast<float>(at(v, 1)), static_cast<float>(at(v, 2))});
+    float out = 0;
+    for (const rig::SlitContact& slit : target.contacts.slits)
+      if (slit.place == place)
+        for (const float g : rig::slitGaps(slit, positions)) out = std::max(out, g);
+    return out / es;
+  };
+  EXPECT_LT(widest(rig::SlitContact::Place::left_eye, result[0]), 0.02);
+  EXPECT_GT(widest(rig::SlitContact::Place::right_eye, result[0]), 0.12);
+}
+
+// An open mouth: the upper teeth stay, the lower ones go with the chin though the artist left the tongue behind.
+TEST(ExpressionTransfer, MouthOpensWithItsLowerTeeth) {
+  VOLTO_REQUIRE_DATA(data);
+  const std::filesystem::path ict = data / "meshes/ict", makehuman = data / "meshes/makehuman/asian-male-old";
+  const rig::Rig source = annotated(makehuman / "neutral.obj", "makehuman_feature_points.json");
+  const rig::Rig target = annotated(ict / "neutral.obj", "ict_feature_points.json");
+  const auto result =
+      ExpressionTransfer(source, target).transfer(std::vector{rig::readMesh(makehuman / "expressions/mouth-open.obj").positions});
+  const double es = target.fapu.fapu.eye_separation;
+  const auto meanMotion = [&](std::string_view part) {
+    Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+    double count = 0;
+    for (const rig::RigidPart& p : target.rigid_parts)
+      if (p.name == part)
+        for (const std::uint32_t v : p.vertices) {
+          sum += result[0].row(v) - target.neutral.positions.row(v);
+          ++count;
+        }
+    return (sum / std::max(count, 1.0) / es).norm();
+  };
+  EXPECT_LT(meanMotion("upper teeth"), 1e-6);
+  EXPECT_GT(meanMotion("lower teeth"), 0.3);
 }
 
 }  // namespace
