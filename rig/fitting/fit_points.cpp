@@ -10,6 +10,7 @@
 #include "rig/closest_point.h"
 #include "rig/control_mask.h"
 #include "rig/fitting/landmark_checks.h"
+#include "rig/fitting/openings.h"
 #include "rig/fitting/registration.h"
 #include "rig/fitting/target_surface.h"
 #include "rig/fitting/visible_triangles.h"
@@ -78,6 +79,7 @@ class Target {
 
   bool insideOut() const { return inside_out_; }
   const std::vector<PlacedLandmark>& landmarks() const { return landmarks_; }
+  const std::vector<std::array<std::uint32_t, 3>>& triangles() const { return triangles_; }
 
   // `outside`: only what is seen from outside.
   TargetSurface inFrameOf(const Similarity& mesh_from_generic, bool outside) const {
@@ -256,6 +258,35 @@ void keepSidesApart(const RegisteredFace& face, const GenericHead& head, const T
   }
 }
 
+// Against one squared eye separation of surface.
+double pinWeight(double sigma_es) { return sigma_es > 0 ? 0.01 / (sigma_es * sigma_es) * 0.05 : 20.0; }
+
+VertexPositions warped(const LandmarkWarp& warp, const VertexPositions& positions) {
+  VertexPositions out(positions.rows(), 3);
+  for (Eigen::Index v = 0; v < out.rows(); ++v) out.row(v) = warp(positions.row(v)).transpose();
+  return out;
+}
+
+// The margins that are seen of each eye and of the mouth, where the fit so far misses one of them by more than heads
+// differ in what is called a margin.
+std::vector<SeenMargin> marginsMissed(const RegisteredFace& face, const GenericHead& head, const VertexPositions& skin,
+                                      const std::vector<std::array<std::uint32_t, 3>>& triangles,
+                                      const std::vector<PlacedLandmark>& landmarks) {
+  constexpr double kMissed_es = 0.07;
+  FeaturePointPositions points;
+  for (std::size_t p = 0; p < kFeaturePointCount; ++p)
+    points.row(static_cast<Eigen::Index>(p)) = placeOn(face.positions, head.points[p]).transpose();
+  std::array<bool, kFeaturePointCount> known{};
+  for (const PlacedLandmark& l : landmarks) known[l.feature_point] = l.sigma_es == 0;
+  std::vector<SeenMargin> margins = seenMargins(skin, triangles, points, known);
+  std::array<bool, 3> missed{};
+  for (const SeenMargin& m : margins)
+    if ((m.position - points.row(static_cast<Eigen::Index>(m.feature_point)).transpose()).norm() > kMissed_es)
+      missed[static_cast<std::size_t>(m.of)] = true;
+  std::erase_if(margins, [&](const SeenMargin& m) { return !missed[static_cast<std::size_t>(m.of)]; });
+  return margins;
+}
+
 std::vector<CorrespondingPlace> denseCorrespondence(const GenericHead& head, const VertexPositions& start,
                                                     const LandmarkWarp& warp, const RegisteredFace& face,
                                                     const TargetSurface& target, const TargetSurface& all_skin) {
@@ -351,14 +382,25 @@ FittedPoints fitPoints(const Mesh& mesh, const FeaturePointChoices& given, std::
   for (const PlacedLandmark& l : landmarks)
     pairs.push_back(
         {human.points.row(static_cast<Eigen::Index>(l.feature_point)), frame.inverse(l.position), l.sigma_es});
-  const LandmarkWarp warp(pairs);
-  VertexPositions start(head.face.positions.rows(), 3);
-  for (Eigen::Index v = 0; v < start.rows(); ++v) start.row(v) = warp(head.face.positions.row(v)).transpose();
   std::vector<FacePin> pins;
   for (const PlacedLandmark& l : landmarks)
-    pins.push_back({head.points[l.feature_point], frame.inverse(l.position),
-                    l.sigma_es > 0 ? 0.01 / (l.sigma_es * l.sigma_es) * 0.05 : 20.0});
-  const RegisteredFace face = registerFace(head, start, target, pins);
+    pins.push_back({head.points[l.feature_point], frame.inverse(l.position), pinWeight(l.sigma_es)});
+  LandmarkWarp warp(pairs);
+  VertexPositions start = warped(warp, head.face.positions);
+  RegisteredFace face = registerFace(head, start, target, pins);
+
+  // Lids and lips that come to lie beside the edges that are seen: those edges are landmarks too, and all once more.
+  const TargetSurface all_skin = on_mesh.inFrameOf(frame, false);
+  if (const std::vector<SeenMargin> margins = marginsMissed(face, head, all_skin.positions(), on_mesh.triangles(), landmarks);
+      !margins.empty()) {
+    for (const SeenMargin& m : margins) {
+      pairs.push_back({human.points.row(static_cast<Eigen::Index>(m.feature_point)), m.position, m.sigma_es});
+      pins.push_back({head.points[m.feature_point], m.position, pinWeight(m.sigma_es)});
+    }
+    warp = LandmarkWarp(pairs);
+    start = warped(warp, head.face.positions);
+    face = registerFace(head, start, target, pins);
+  }
   const VertexPositions normals = faceNormals(face_triangles, face.positions);
 
   std::vector<bool> vertex_taken(mesh.vertexCount(), false);
@@ -390,7 +432,7 @@ FittedPoints fitPoints(const Mesh& mesh, const FeaturePointChoices& given, std::
   std::stable_sort(out.to_check.begin(), out.to_check.end(),
                    [&](std::size_t a, std::size_t b) { return out.confidence[a] < out.confidence[b]; });
   out.folded_triangles = face.folded;
-  out.dense = denseCorrespondence(head, start, warp, face, target, on_mesh.inFrameOf(frame, false));
+  out.dense = denseCorrespondence(head, start, warp, face, target, all_skin);
   return out;
 }
 
