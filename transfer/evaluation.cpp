@@ -11,6 +11,14 @@ namespace {
 
 constexpr double kAreaFactor = 3;
 
+std::vector<std::array<float, 3>> toFloat(const rig::VertexPositions& p) {
+  std::vector<std::array<float, 3>> out(static_cast<std::size_t>(p.rows()));
+  for (std::size_t v = 0; v < out.size(); ++v)
+    for (std::size_t k = 0; k < 3; ++k)
+      out[v][k] = static_cast<float>(p(static_cast<Eigen::Index>(v), static_cast<Eigen::Index>(k)));
+  return out;
+}
+
 class Sum {
  public:
   void add(double error2, double expected2) {
@@ -84,6 +92,10 @@ Evaluation evaluate(const rig::Mesh& neutral, const rig::VertexPositions& truth_
       if (got.dot(wanted) < 0) ++expression.flipped;
       if (got.norm() > kAreaFactor * wanted.norm() || wanted.norm() > kAreaFactor * got.norm())
         ++expression.area_distorted;
+    }
+    if (scope.contacts != nullptr) {
+      expression.result_passes = rig::measurePenetration(*scope.contacts, toFloat(results[i]));
+      expression.expected_passes = rig::measurePenetration(*scope.contacts, toFloat(expected));
     }
     if (expression.whole.relative) {
       relative_sum += *expression.whole.relative;

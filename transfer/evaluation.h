@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "rig/contacts.h"
 #include "rig/mesh.h"
 
 namespace volto::transfer {
@@ -34,6 +35,8 @@ struct ExpressionEvaluation {
   // Triangles whose area changed by more than a factor 3 against what was expected, and those that are inside out
   // against the expected shape (normals more than 90 degrees apart).
   std::size_t area_distorted = 0, flipped = 0;
+  // How deep lips and lids have passed each other and skin entered an eyeball, beyond rest; where contacts are known.
+  std::optional<rig::Penetration> result_passes, expected_passes;
 };
 
 struct Evaluation {
@@ -48,6 +51,7 @@ struct EvaluationScope {
   std::size_t first_vertex = 0, end_vertex = SIZE_MAX;  // only these are judged
   std::vector<std::string> region_names;                // empty: no regions
   std::vector<std::int16_t> region_of_vertex;           // #V: index into region_names, -1: none
+  const rig::Contacts* contacts = nullptr;              // of the neutral mesh; borrowed for the call
 };
 
 // One `result` and one `truth` per name. Throws std::invalid_argument when sizes differ.

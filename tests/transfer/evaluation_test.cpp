@@ -83,5 +83,29 @@ TEST_F(OneExpression, AnotherPersonsTruthIsCarriedOverAsDisplacement) {
   EXPECT_LT(e.mean_relative, 1e-12);
 }
 
+TEST_F(OneExpression, LipsThatPassEachOtherAreMeasured) {
+  rig::Contacts contacts;
+  rig::SlitContact slit;
+  slit.up = {0, 1, 0};
+  for (std::size_t k = 0; k < sheet.upper.size(); ++k) {
+    slit.upper.push_back({sheet.upper[k], sheet.upper[k], 0});
+    slit.lower.push_back({sheet.lower[k], sheet.lower[k], 0});
+    slit.least_gap.push_back(0);
+  }
+  // A corner on each side, so that there are columns.
+  slit.upper.push_back({sheet.upper.back() + 1, sheet.upper.back() + 1, 0});
+  slit.lower.push_back({sheet.upper.back() + 1, sheet.upper.back() + 1, 0});
+  slit.least_gap.push_back(0);
+  contacts.slits.push_back(slit);
+  EvaluationScope scope;
+  EXPECT_FALSE(judge(truth).expressions[0].result_passes);
+  scope.contacts = &contacts;
+  EXPECT_EQ(judge(truth, scope).expressions[0].result_passes->lips, 0);
+  rig::VertexPositions crossed = truth;
+  for (const std::uint32_t v : sheet.upper) crossed(v, 1) -= 0.7;  // the slit is 0.4 wide
+  EXPECT_NEAR(judge(crossed, scope).expressions[0].result_passes->lips, 0.3, 1e-5);
+  EXPECT_EQ(judge(crossed, scope).expressions[0].expected_passes->lips, 0);
+}
+
 }  // namespace
 }  // namespace volto::transfer

@@ -97,6 +97,11 @@ void printJson(const transfer::Evaluation& evaluation, const Pairs& pairs, std::
     Json json = figuresJson(e.whole, eye_separation);
     json["flipped_triangles"] = e.flipped;
     json["area_distorted_triangles"] = e.area_distorted;
+    const auto passes = [](const rig::Penetration& p) {
+      return Json{{"lips", p.lips}, {"lids", p.lids}, {"eyeball", p.ball}};
+    };
+    if (e.result_passes) json["passes"] = passes(*e.result_passes);
+    if (e.expected_passes) json["passes_expected"] = passes(*e.expected_passes);
     for (std::size_t r = 0; r < e.regions.size(); ++r)
       json["regions"][evaluation.region_names[r]] = figuresJson(e.regions[r], eye_separation);
     expressions[e.name] = std::move(json);
@@ -111,8 +116,8 @@ void printJson(const transfer::Evaluation& evaluation, const Pairs& pairs, std::
 }
 
 void printTable(const transfer::Evaluation& evaluation, const Pairs& pairs, std::optional<double> eye_separation) {
-  std::printf("%-24s %8s %10s %10s%s %8s %9s\n", "expression", "relative", "rms", "maximum",
-              eye_separation ? "  max/eyes" : "", "flipped", "distorted");
+  std::printf("%-24s %8s %10s %10s%s %8s %9s%s\n", "expression", "relative", "rms", "maximum",
+              eye_separation ? "  max/eyes" : "", "flipped", "distorted", eye_separation ? "   passes" : "");
   for (const transfer::ExpressionEvaluation& e : evaluation.expressions) {
     std::printf("%-24s ", e.name.c_str());
     if (e.whole.relative)
@@ -121,9 +126,14 @@ void printTable(const transfer::Evaluation& evaluation, const Pairs& pairs, std:
       std::printf("%8s", "still");
     std::printf(" %10.5g %10.5g", e.whole.rms, e.whole.maximum);
     if (eye_separation) std::printf(" %8.2f %%", 100 * e.whole.maximum / *eye_separation);
-    std::printf(" %8zu %9zu\n", e.flipped, e.area_distorted);
+    std::printf(" %8zu %9zu", e.flipped, e.area_distorted);
+    if (eye_separation && e.result_passes)
+      std::printf(" %6.2f %%", 100 * static_cast<double>(std::max(e.result_passes->lips, e.result_passes->lids)) /
+                                   *eye_separation);
+    std::puts("");
   }
   std::printf("mean relative error of %zu: %.4f\n", evaluation.related, evaluation.mean_relative);
+  if (eye_separation) std::puts("passes: how far lips or lids have gone through each other, of the eye separation");
   if (!evaluation.region_names.empty()) {
     std::puts("by region, relative error over all expressions:");
     for (std::size_t r = 0; r < evaluation.region_names.size(); ++r) {
@@ -160,6 +170,7 @@ int run(const Options& options) {
                                         std::to_string(neutral.vertexCount()) + " vertices");
   std::optional<double> eye_separation;
   Eigen::Matrix3d mesh_from_head = Eigen::Matrix3d::Identity();
+  rig::Contacts contacts;
   if (!options.rig.empty()) {
     requireReadable(options.rig);
     const rig::Rig rig = rig::readRig(options.rig);
@@ -169,6 +180,8 @@ int run(const Options& options) {
                                        std::to_string(neutral.vertexCount()) + "; give the rig of that mesh");
     nameRegions(rig, scope);
     eye_separation = rig.fapu.fapu.eye_separation;
+    contacts = rig.contacts;
+    scope.contacts = &contacts;
     mesh_from_head = rig.mesh_from_head;
   }
   const Pairs pairs =
