@@ -128,8 +128,8 @@ void printTable(const transfer::Evaluation& evaluation, const Pairs& pairs, std:
     if (eye_separation) std::printf(" %8.2f %%", 100 * e.whole.maximum / *eye_separation);
     std::printf(" %8zu %9zu", e.flipped, e.area_distorted);
     if (eye_separation && e.result_passes)
-      std::printf(" %6.2f %%", 100 * static_cast<double>(std::max(e.result_passes->lips, e.result_passes->lids)) /
-                                   *eye_separation);
+      std::printf(" %6.2f %%",
+                  100 * static_cast<double>(std::max(e.result_passes->lips, e.result_passes->lids)) / *eye_separation);
     std::puts("");
   }
   std::printf("mean relative error of %zu: %.4f\n", evaluation.related, evaluation.mean_relative);
