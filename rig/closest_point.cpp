@@ -19,6 +19,11 @@ double boxDistance2(const Eigen::Vector3d& p, const Eigen::Vector3d& low, const 
 
 }  // namespace
 
+double shareOnSegment(const Eigen::Vector3d& p, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  const double length2 = (to - from).squaredNorm();
+  return length2 > 0 ? std::clamp((p - from).dot(to - from) / length2, 0.0, 1.0) : 0.0;
+}
+
 SurfacePoint closestPointOnTriangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                                     const Eigen::Vector3d& c) {
   SurfacePoint best;
@@ -37,11 +42,7 @@ SurfacePoint closestPointOnTriangle(const Eigen::Vector3d& p, const Eigen::Vecto
       return best;
     }
   }
-  const auto along = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
-    const double length2 = (to - from).squaredNorm();
-    return length2 > 0 ? std::clamp((p - from).dot(to - from) / length2, 0.0, 1.0) : 0.0;
-  };
-  const double s = along(a, b), t = along(b, c), r = along(c, a);
+  const double s = shareOnSegment(p, a, b), t = shareOnSegment(p, b, c), r = shareOnSegment(p, c, a);
   consider(1 - s, s, 0);
   consider(0, 1 - t, t);
   consider(r, 0, 1 - r);

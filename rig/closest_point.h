@@ -21,6 +21,9 @@ struct SurfacePoint {
 // The row of `positions` (not empty) that is nearest to `p`.
 Eigen::Index nearestVertex(const VertexPositions& positions, const Eigen::RowVector3d& p);
 
+// How far along the segment its nearest point to p lies: 0 at `from`, 1 at `to`; 0 for one without length.
+double shareOnSegment(const Eigen::Vector3d& p, const Eigen::Vector3d& from, const Eigen::Vector3d& to);
+
 // The nearest point of one triangle; a degenerate one counts as its longest edge.
 SurfacePoint closestPointOnTriangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                                     const Eigen::Vector3d& c);

@@ -5,25 +5,10 @@
 #include <optional>
 
 #include "rig/unfold_rounds.h"
+#include "rig/vec3.h"
 
 namespace volto::rig {
 namespace {
-
-using Vec3 = std::array<float, 3>;
-
-[[gnu::always_inline]] inline Vec3 operator+(const Vec3& a, const Vec3& b) {
-  return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
-}
-[[gnu::always_inline]] inline Vec3 operator-(const Vec3& a, const Vec3& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-[[gnu::always_inline]] inline Vec3 operator*(float s, const Vec3& a) { return {s * a[0], s * a[1], s * a[2]}; }
-[[gnu::always_inline]] inline float dot(const Vec3& a, const Vec3& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-[[gnu::always_inline]] inline Vec3 cross(const Vec3& a, const Vec3& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
 
 // With `drawn_back`, what was lifted off comes back too. `touched` gains what was pushed out.
 void keepOnBall(const BallContact& ball, bool drawn_back, std::span<Vec3> positions,

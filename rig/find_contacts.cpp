@@ -155,10 +155,8 @@ class ContactFinder {
       const Eigen::Vector3d p = position(v);
       if (((p - low).array() < -far).any() || ((p - high).array() > far).any()) continue;
       for (std::size_t i = 0; i + 1 < curve.size(); ++i) {
-        const Eigen::Vector3d along = curve[i + 1] - curve[i];
-        const double length2 = along.squaredNorm();
-        const double t = length2 > 0 ? std::clamp((p - curve[i]).dot(along) / length2, 0.0, 1.0) : 0.0;
-        distance[v] = std::min(distance[v], (p - curve[i] - t * along).norm());
+        const double t = shareOnSegment(p, curve[i], curve[i + 1]);
+        distance[v] = std::min(distance[v], (p - curve[i] - t * (curve[i + 1] - curve[i])).norm());
       }
     }
     for (std::uint32_t v = 0; v < distance.size(); ++v)
@@ -376,8 +374,7 @@ class ContactFinder {
     for (const auto* margin : {&slit.upper, &slit.lower}) {
       for (const SlitContact::Sample& s : *margin) {
         const Eigen::Vector3d from = position(s.first), along = position(s.second) - from;
-        const double length2 = along.squaredNorm();
-        const double t = length2 > 0 ? std::clamp((position(rider.vertex) - from).dot(along) / length2, 0.0, 1.0) : 0.0;
+        const double t = shareOnSegment(position(rider.vertex), from, position(s.second));
         const double distance = (from + t * along - position(rider.vertex)).squaredNorm();
         if (distance >= least) continue;
         least = distance;
@@ -420,18 +417,19 @@ class ContactFinder {
     const SlitContact* const slit = by_roots ? slitOf(lid) : nullptr;
     const bool left = lid == SlitSide::left_upper_lid || lid == SlitSide::left_lower_lid;
     for (std::size_t i = 0; i < part.vertices.size(); ++i) {
-      std::size_t root = i;
-      if (by_roots)
-        root = *std::min_element(roots.begin(), roots.end(), [&](std::size_t a, std::size_t b) {
-          const Eigen::Vector3d p = position(part.vertices[i]);
-          return (position(part.vertices[a]) - p).squaredNorm() < (position(part.vertices[b]) - p).squaredNorm();
-        });
-      if (nearest[root].triangle < 0 || !moves(part.vertices[i])) continue;
+      if (!moves(part.vertices[i])) continue;
       Rider rider;
       rider.vertex = part.vertices[i];
       if (slit != nullptr) {
         anchorAtMargin(*slit, rider);
       } else {
+        std::size_t root = i;
+        if (by_roots)
+          root = *std::min_element(roots.begin(), roots.end(), [&](std::size_t a, std::size_t b) {
+            const Eigen::Vector3d p = position(part.vertices[i]);
+            return (position(part.vertices[a]) - p).squaredNorm() < (position(part.vertices[b]) - p).squaredNorm();
+          });
+        if (nearest[root].triangle < 0) continue;
         rider.anchor = surface.triangle(nearest[root].triangle);
         for (std::size_t k = 0; k < 3; ++k) rider.weight[k] = static_cast<float>(nearest[root].barycentric[k]);
       }

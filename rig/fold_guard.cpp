@@ -9,6 +9,7 @@
 #include "rig/rig.h"
 #include "rig/skin.h"
 #include "rig/unfold_rounds.h"
+#include "rig/vec3.h"
 
 namespace volto::rig {
 namespace {
@@ -18,29 +19,17 @@ constexpr float kLeast = 0.01F;      // of its area at rest
 constexpr float kWatched = 0.5F;     // a triangle that some expression brings below this share of its area
 constexpr float kLeastArea = 1e-9F;  // in squares of the eye separation: what is smaller at rest has no direction
 
-using Vec3 = std::array<float, 3>;
-
-[[gnu::always_inline]] inline Vec3 minus(const Vec3& a, const Vec3& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-[[gnu::always_inline]] inline Vec3 cross(const Vec3& a, const Vec3& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-[[gnu::always_inline]] inline float dot(const Vec3& a, const Vec3& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 // Gives a triangle what it lacks. Returns whether it lacked something; `moved`: and could be helped.
 [[gnu::always_inline]] inline bool bringBack(const FoldGuard& guard, std::size_t i, std::span<Vec3> positions,
                                              bool& moved) {
   moved = false;
   const auto& [a, b, c] = guard.triangle[i];
   const Vec3 &pa = positions[a], &pb = positions[b], &pc = positions[c], &n = guard.normal[i];
-  const Vec3 ab = minus(pb, pa), ac = minus(pc, pa);
+  const Vec3 ab = pb - pa, ac = pc - pa;
   const float shown = dot(n, cross(ab, ac));
   if (!(shown < guard.least[i])) return false;
   // Gradients: each corner straight away from the opposite edge, as seen along n.
-  const Vec3 of_a = cross(minus(pb, pc), n), of_b = cross(ac, n), of_c = cross(n, ab);
+  const Vec3 of_a = cross(pb - pc, n), of_b = cross(ac, n), of_c = cross(n, ab);
   const float squared = dot(of_a, of_a) + dot(of_b, of_b) + dot(of_c, of_c);
   if (!(squared > 2 * guard.least[i])) return true;  // shrunk to a point: there is no way out of it
   // More than what is missing, so that rounds end.
@@ -112,7 +101,7 @@ FoldGuard guardAgainstFolds(const Rig& rig, const Skin& skin) {
   for (std::array<std::uint32_t, 3> t : triangulate(rig.neutral)) {
     if (!std::all_of(t.begin(), t.end(), moves)) continue;
     for (std::uint32_t& v : t) v = skin.same_as[v];
-    const Vec3 normal = cross(minus(neutral[t[1]], neutral[t[0]]), minus(neutral[t[2]], neutral[t[0]]));
+    const Vec3 normal = cross(neutral[t[1]] - neutral[t[0]], neutral[t[2]] - neutral[t[0]]);
     const float area = std::sqrt(dot(normal, normal));
     if (!(area > kLeastArea * es * es)) continue;
     triangles.push_back(t);
@@ -133,7 +122,7 @@ FoldGuard guardAgainstFolds(const Rig& rig, const Skin& skin) {
     resolveContacts(contacts, neutral, positions);
     for (std::size_t t = 0; t < triangles.size(); ++t) {
       const auto& [a, b, c] = triangles[t];
-      const Vec3 now = cross(minus(positions[b], positions[a]), minus(positions[c], positions[a]));
+      const Vec3 now = cross(positions[b] - positions[a], positions[c] - positions[a]);
       if (dot(normals[t], now) < kWatched * areas[t]) watched[t] = 1;
     }
     std::fill(weights.begin(), weights.end(), 0.0F);
