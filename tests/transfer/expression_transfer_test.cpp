@@ -89,7 +89,7 @@ TEST(ExpressionTransfer, EyesCloseOnAHeadOfAnotherTopology) {
   EXPECT_GT(gap("3.1", "3.3", target.neutral.positions), 0.12);
   EXPECT_LT(gap("3.1", "3.3", result[0]), 0.04);
   EXPECT_NEAR(gap("3.2", "3.4", result[0]), gap("3.2", "3.4", target.neutral.positions), 0.02);
-  // In every column from corner to corner, as the contacts see it.
+  // In every column from corner to corner, as the contacts see it. Measured: 0.013.
   const auto widest = [&](rig::SlitContact::Place place, const rig::VertexPositions& at) {
     std::vector<std::array<float, 3>> positions;
     for (Eigen::Index v = 0; v < at.rows(); ++v)
