@@ -55,6 +55,7 @@ struct HealthMeasure::State {
   std::vector<Triangle> triangles;
   std::vector<Vertex> neutral, positions;
   std::vector<Eigen::Vector3d> rest_normal;
+  std::vector<bool> of_skin;  // per triangle
   std::vector<SlitSides> slits;
   std::vector<std::uint8_t> unmoved;
   rig::VertexPositions scratch;
@@ -84,7 +85,12 @@ struct HealthMeasure::State {
     for (const rig::RigidPart& part : rig.rigid_parts) {
       for (const std::uint32_t v : part.vertices) unmoved[v] = 0;
     }
-    for (const Triangle& t : triangles) rest_normal.push_back(normalOf(neutral, t));
+    for (const Triangle& t : triangles) {
+      rest_normal.push_back(normalOf(neutral, t));
+      of_skin.push_back(std::none_of(t.begin(), t.end(), [&](std::uint32_t v) {
+        return rig.association.kind[v] == rig::AssociationKind::rigid_part;
+      }));
+    }
     for (const rig::SlitContact& slit : contacts.slits) addSlit(slit);
   }
 
@@ -243,7 +249,10 @@ PoseHealth HealthMeasure::measure(const std::string& name, std::span<const Verte
     const Eigen::Vector3d now = normalOf(pose, s.triangles[t]);
     const double rest = s.rest_normal[t].norm();
     if (!(rest > 1e-9 * s.es * s.es)) continue;  // was nothing at rest
-    if (now.dot(s.rest_normal[t]) < 0) ++out.flipped;
+    if (now.dot(s.rest_normal[t]) < 0) {
+      ++out.flipped;
+      out.flipped_skin += s.of_skin[t] ? 1 : 0;
+    }
     if (now.norm() < 1e-3 * rest) ++out.degenerate;
   }
   out.eyeball_depth_es = static_cast<double>(rig::measurePenetration(s.contacts, pose).ball) / s.es;
@@ -302,6 +311,14 @@ std::size_t ExpressionHealth::flipped() const {
   return sum;
 }
 
+std::size_t ExpressionHealth::flippedSkin() const {
+  std::size_t sum = 0;
+  for (const auto* list : {&shapes, &combinations}) {
+    for (const PoseHealth& p : *list) sum += p.flipped_skin;
+  }
+  return sum;
+}
+
 std::size_t ExpressionHealth::degenerate() const {
   std::size_t sum = 0;
   for (const auto* list : {&shapes, &combinations}) {
@@ -316,6 +333,7 @@ PoseHealth ExpressionHealth::worst() const {
     for (const PoseHealth& p : *list) {
       if (p.flipped > out.flipped) out.name = p.name;
       out.flipped = std::max(out.flipped, p.flipped);
+      out.flipped_skin = std::max(out.flipped_skin, p.flipped_skin);
       out.degenerate = std::max(out.degenerate, p.degenerate);
       out.eyeball_depth_es = std::max(out.eyeball_depth_es, p.eyeball_depth_es);
       out.lids_depth_es = std::max(out.lids_depth_es, p.lids_depth_es);

@@ -16,6 +16,7 @@ namespace volto::retarget {
 struct PoseHealth {
   std::string name;
   std::size_t flipped = 0;      // triangles that face away from where they faced at rest, by more than a right angle
+  std::size_t flipped_skin = 0;  // of these, those of the skin itself: no lash, no wet edge of a lid, no gum
   std::size_t degenerate = 0;   // triangles left with less than a thousandth of their area
   double eyeball_depth_es = 0;  // of the deepest skin vertex in an eyeball, beyond what it was at rest
   double lids_depth_es = 0;     // of the deepest vertex of one lid in the other, beyond rest
@@ -31,6 +32,7 @@ struct ExpressionHealth {
   double border_es = 0;    // displacement of vertices that the operator does not move, rigid parts aside
 
   std::size_t flipped() const;  // all shapes and combinations together
+  std::size_t flippedSkin() const;
   std::size_t degenerate() const;
   PoseHealth worst() const;  // the largest of each number; name: of the pose with most flips
 };

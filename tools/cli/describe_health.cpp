@@ -54,17 +54,20 @@ Json expressionsOf(const rig::Rig& rig, Json& problems) {
   const retarget::PoseHealth* worst = nullptr;
   for (const auto* list : {&health.shapes, &health.combinations})
     for (const retarget::PoseHealth& pose : *list) {
-      if (pose.flipped > 0) flipping.push_back({{"name", pose.name}, {"triangles", pose.flipped}});
+      if (pose.flipped > 0)
+        flipping.push_back({{"name", pose.name}, {"triangles", pose.flipped}, {"of_skin", pose.flipped_skin}});
       if (pose.flipped > 0 && (worst == nullptr || pose.flipped > worst->flipped)) worst = &pose;
     }
   const retarget::PoseHealth deepest = health.worst();
   if (worst != nullptr)
-    problems.push_back(std::to_string(flipping.size()) + " expressions turn triangles over, most of all " +
-                       worst->name + " (" + std::to_string(worst->flipped) +
+    problems.push_back(std::to_string(flipping.size()) + " expressions turn triangles over" +
+                       (health.flippedSkin() > 0 ? "" : ", none of the skin itself but in its parts") +
+                       ", most of all " + worst->name + " (" + std::to_string(worst->flipped) +
                        "): look at the picture of it (--picture)");
   return {{"shapes", health.shapes.size()},
           {"combinations", health.combinations.size()},
           {"flipped_triangles", health.flipped()},
+          {"flipped_triangles_of_skin", health.flippedSkin()},
           {"degenerate_triangles", health.degenerate()},
           {"flipping", std::move(flipping)},
           {"eyeball_depth_es", deepest.eyeball_depth_es},
@@ -111,9 +114,10 @@ std::string healthInWords(const Json& health, const Json& problems) {
   text += line;
   const Json& expressions = health["expressions"];
   std::snprintf(line, sizeof line,
-                "expressions: %zu triangles turn over in %zu shapes and %zu combinations, %zu degenerate; doubtful "
+                "expressions: %zu triangles turn over (%zu of the skin) in %zu shapes and %zu combinations, %zu degenerate; doubtful "
                 "vertices: %zu, unassigned: %zu\n",
-                expressions["flipped_triangles"].get<std::size_t>(), expressions["shapes"].get<std::size_t>(),
+                expressions["flipped_triangles"].get<std::size_t>(),
+                expressions["flipped_triangles_of_skin"].get<std::size_t>(), expressions["shapes"].get<std::size_t>(),
                 expressions["combinations"].get<std::size_t>(), expressions["degenerate_triangles"].get<std::size_t>(),
                 health["doubtful"]["count"].get<std::size_t>(), health["unassigned"]["count"].get<std::size_t>());
   text += line;

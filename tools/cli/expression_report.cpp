@@ -23,6 +23,7 @@ Json expressionReport(const rig::Rig& rig) {
         continue;
       poses.push_back({{"name", pose.name},
                        {"flipped", pose.flipped},
+                       {"flipped_skin", pose.flipped_skin},
                        {"degenerate", pose.degenerate},
                        {"eyeball_depth_es", pose.eyeball_depth_es},
                        {"lids_depth_es", pose.lids_depth_es},
@@ -32,6 +33,7 @@ Json expressionReport(const rig::Rig& rig) {
   return {{"poses", health.shapes.size() + health.combinations.size()},
           {"triangles", health.triangles},
           {"flipped", health.flipped()},
+          {"flipped_skin", health.flippedSkin()},
           {"degenerate", health.degenerate()},
           {"eyeball_depth_es", worst.eyeball_depth_es},
           {"lids_depth_es", worst.lids_depth_es},
