@@ -118,8 +118,15 @@ std::vector<double> gainByTriangle(const SkinProblem& problem, const Subdivider&
       points.row(static_cast<Eigen::Index>(p)) += mask.points[p].weight[i] * examples.row(mask.points[p].around[i].vertex);
   }
   const Columns made = SkinInterpolation(problem, mask).displace(points);
+  // What is to fall is the mean over the examples of |made - example| / |example|: its slope, so that an example that is
+  // nearly right already counts for what it can still give.
+  Eigen::RowVectorXd error2 = Eigen::RowVectorXd::Zero(examples.cols());
+  for (std::size_t t = 0; t < subdivider.triangleCount(); ++t)
+    for (const std::uint32_t v : subdivider.verticesOf(t)) error2 += (made.row(v) - examples.row(v)).array().square().matrix();
+  for (Eigen::Index k = 0; k < error2.size(); k += 3) error2.segment(k, 3).setConstant(error2.segment(k, 3).sum());
+  const Eigen::RowVectorXd slope = (error2.array().max(1e-30) * size2.array()).rsqrt().matrix();
   const auto errorAt = [&](std::int64_t v) {
-    return ((made.row(v) - examples.row(v)).array().square() / size2.array()).sum();
+    return ((made.row(v) - examples.row(v)).array().square() * slope.array()).sum();
   };
   std::vector<double> gain(subdivider.triangleCount(), 0.0);
   for (std::size_t t = 0; t < gain.size(); ++t) {

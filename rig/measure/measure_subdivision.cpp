@@ -7,7 +7,8 @@
 //
 // Before that, the jump of displacement across the borders of the mask's triangles (rig/rig_health.h) against that of
 // the paper's hard association, on the mesh and on one with every triangle cut in four: what a smooth field leaves on a
-// coarse mesh goes with the square of its edges, a jump stays.
+// coarse mesh goes with the square of its edges, a jump stays. And that of the expressions themselves, which know nothing
+// of the mask: what the measure sees of the skin's own folds.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -105,12 +106,17 @@ Mesh finer(const Mesh& mesh) {
   return out;
 }
 
-// Jump of displacement where neighbours belong to different triangles of the mask, over all expressions: the rig's, and
-// that of the paper's hard association, where every vertex moves by its own triangle's RBF alone.
-void reportSmoothness(const Rig& rig) {
+std::vector<std::int16_t> trianglesByRay(const Rig& rig) {
   std::vector<std::int16_t> triangle = rig.association.triangle;
   for (std::size_t v = 0; v < triangle.size(); ++v)
     if (rig.association.kind[v] != AssociationKind::ray) triangle[v] = -1;
+  return triangle;
+}
+
+// Jump of displacement where neighbours belong to different triangles of the mask, over all expressions: the rig's, and
+// that of the paper's hard association, where every vertex moves by its own triangle's RBF alone.
+void reportSmoothness(const Rig& rig) {
+  const std::vector<std::int16_t> triangle = trianglesByRay(rig);
   std::vector<Multiquadric> rbf(kMaskTriangleCount);
   const VertexPositions at = rig.feature_positions;
   for (std::size_t t = 0; t < kMaskTriangleCount; ++t)
@@ -148,6 +154,14 @@ void reportSmoothness(const Rig& rig) {
       rig.neutral.vertexCount(), ours / shapes, hard / shapes, hard / ours);
 }
 
+void reportOwnSmoothness(const Rig& rig, const Examples& examples) {
+  const std::vector<std::int16_t> triangle = trianglesByRay(rig);
+  double sum = 0;
+  for (const VertexPositions& truth : examples.displacements) sum += borderJump(rig.neutral, triangle, truth).relative();
+  std::printf("%zu vertices: the same of the expressions themselves: %.5f\n", rig.neutral.vertexCount(),
+              sum / static_cast<double>(examples.displacements.size()));
+}
+
 int run(int argc, char** argv) {
   const std::filesystem::path folder = argv[1];
   const Mesh neutral = readMesh(folder / "neutral.obj");
@@ -164,6 +178,7 @@ int run(int argc, char** argv) {
   std::printf("rigging: %.2f s, %.2f s of all processors\n", secondsSince(start_of_rigging),
               static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC);
   reportSmoothness(plain);
+  reportOwnSmoothness(plain, examples);
   reportSmoothness(buildRig(finer(neutral), points));
   const VertexPositions at = neutral.positions.topRows(counted);
   const auto report = [&](const std::string& name, const Subdivision& subdivision) {
