@@ -15,7 +15,8 @@ constexpr int kPatience = 48;    // rounds without a better one
 constexpr float kLeaning = 0.4F;
 constexpr float kFoldCosine = 0.12F;  // a little before a triangle stands at right angles to where it was
 constexpr float kFolded = 0.02F;
-constexpr float kLeastArea = 0.01F;  // of what it was
+constexpr double kCostOfRelaxed = 0.01;  // of a vertex, in folded triangles
+constexpr float kLeastArea = 0.01F;      // of what it was
 
 }  // namespace
 
@@ -128,6 +129,8 @@ bool PoseLab::unfold(DenseDisplacement& extra, std::span<const std::uint32_t> he
   std::vector<Eigen::Vector3f> moved(neutral_.size(), Eigen::Vector3f::Zero()), next;
   DenseDisplacement best = extra;
   std::size_t fewest = std::numeric_limits<std::size_t>::max();
+  std::size_t left = fewest;  // by the best
+  double lowest = std::numeric_limits<double>::infinity();
   int best_round = 0;
   for (int round = 0; round < kMostRounds; ++round) {
     seeds.clear();
@@ -140,10 +143,16 @@ bool PoseLab::unfold(DenseDisplacement& extra, std::span<const std::uint32_t> he
     }
     if (seeds.empty()) return true;
     if (round > best_round + kPatience) break;
+    // Folds that do not go away are not worth what relaxing ever more skin around them does to its form.
+    const double cost = static_cast<double>(folded) + kCostOfRelaxed * static_cast<double>(region.size());
+    if (cost < lowest) {
+      lowest = cost;
+      best = extra;
+      left = folded;
+    }
     if (folded < fewest) {
       fewest = folded;
       best_round = round;
-      best = extra;
     }
     // The region only grows, so that a fold is not chased to and fro; all of it when a narrow one does not do.
     if (round >= 12 && round % 8 == 4) seeds.insert(seeds.end(), region.begin(), region.end());
@@ -193,7 +202,7 @@ bool PoseLab::unfold(DenseDisplacement& extra, std::span<const std::uint32_t> he
   }
   extra = std::move(best);
   evaluate(extra);
-  return fewest == 0;
+  return left == 0;
 }
 
 SparseDisplacement PoseLab::sparse(const DenseDisplacement& dense) const {
