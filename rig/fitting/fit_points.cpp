@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <variant>
 
 #include <Eigen/Geometry>
@@ -10,6 +11,7 @@
 #include "rig/closest_point.h"
 #include "rig/control_mask.h"
 #include "rig/fitting/landmark_checks.h"
+#include "rig/fitting/mirror_image.h"
 #include "rig/fitting/openings.h"
 #include "rig/fitting/registration.h"
 #include "rig/fitting/target_surface.h"
@@ -24,6 +26,8 @@ const std::array<std::string_view, 10> kTenPoints = {"3.7", "3.12", "4.3", "4.4"
 
 namespace {
 
+// How much farther away the surface's midline may be than the surface.
+constexpr double kBesideMiddle_es = 0.3;
 // A point less sure than this should be looked at.
 constexpr double kDoubtful = 0.5;
 // The expected error, in eye separations, at which confidence is one half.
@@ -324,6 +328,15 @@ std::vector<CorrespondingPlace> denseCorrespondence(const GenericHead& head, con
   return out;
 }
 
+FacePoints pointsOf(const GenericHead& head, const RegisteredFace& face, const VertexPositions& normals) {
+  FacePoints out;
+  for (std::size_t p = 0; p < kFeaturePointCount; ++p) {
+    out.positions.row(static_cast<Eigen::Index>(p)) = placeOn(face.positions, head.points[p]).transpose();
+    out.normals.row(static_cast<Eigen::Index>(p)) = placeOn(normals, head.points[p]).normalized().transpose();
+  }
+  return out;
+}
+
 FeaturePointPositions normalsAtPoints(const GenericHead& head,
                                       const std::vector<std::array<std::uint32_t, 3>>& face_triangles) {
   const VertexPositions normals = faceNormals(face_triangles, head.face.positions);
@@ -377,6 +390,12 @@ FittedPoints fitPoints(const Mesh& mesh, const FeaturePointChoices& given, std::
   out.notes = std::move(placed.notes);
   const TargetSurface target = on_mesh.inFrameOf(frame, true);
 
+  // What is known of one side of a face that is its own mirror image is known of the other.
+  constexpr double kFace_es = 1.3;
+  const std::optional<MirrorPlane> mirror = findMirrorPlane(target, human.points.colwise().mean().transpose(), kFace_es);
+  if (mirror)
+    addMirrorImages(*mirror, frame, landmarks);
+
   // Landmarks to landmarks, then surface to surface.
   std::vector<WarpLandmark> pairs;
   for (const PlacedLandmark& l : landmarks)
@@ -403,6 +422,8 @@ FittedPoints fitPoints(const Mesh& mesh, const FeaturePointChoices& given, std::
   }
   const VertexPositions normals = faceNormals(face_triangles, face.positions);
 
+  FacePoints read = pointsOf(head, face, normals);
+  if (mirror) read = alikeOnBothSides(read, *mirror, frame, landmarks);
   std::vector<bool> vertex_taken(mesh.vertexCount(), false);
   for (const auto& [p, choice] : given)
     if (const auto* vertex = std::get_if<std::uint32_t>(&choice)) vertex_taken[*vertex] = true;
@@ -413,9 +434,13 @@ FittedPoints fitPoints(const Mesh& mesh, const FeaturePointChoices& given, std::
       out.confidence[p] = 1;
       continue;
     }
-    const Eigen::Vector3d at = placeOn(face.positions, head.points[p]),
-                          normal = placeOn(normals, head.points[p]).normalized();
-    const SurfaceHit hit = readOff(target, at, normal);
+    const auto row = static_cast<Eigen::Index>(p);
+    SurfaceHit hit = readOff(target, read.positions.row(row), read.normals.row(row));
+    if (mirror && featurePoints()[p].mirror == p) {
+      // In a groove what is nearest to the middle lies beside it.
+      const SurfaceHit middle = findOnPlane(target, *mirror, read.positions.row(row), read.normals.row(row));
+      if (middle.distance < hit.distance + kBesideMiddle_es) hit = middle;
+    }
     out.points.emplace(p, choiceFor(p, target, hit, frame, vertex_taken));
     const double deviation = 0.75 * warp.deviation(human.points.row(static_cast<Eigen::Index>(p)));
     const double error2 = std::pow(human.spread[p], 2) + deviation * deviation + hit.distance * hit.distance;

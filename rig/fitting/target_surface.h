@@ -28,6 +28,7 @@ class TargetSurface {
   // The nearest point among triangles whose normal n has n . normal >= min_cosine (-1: all).
   SurfaceHit find(const Eigen::Vector3d& p, const Eigen::Vector3d& normal, double min_cosine, double limit) const;
 
+  std::size_t triangleCount() const { return triangles_.size(); }
   const VertexPositions& positions() const { return positions_; }
   const std::array<std::uint32_t, 3>& triangle(std::int64_t t) const { return triangles_[static_cast<std::size_t>(t)]; }
   const Eigen::Vector3d& normal(std::int64_t t) const { return normals_[static_cast<std::size_t>(t)]; }

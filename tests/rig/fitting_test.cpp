@@ -104,6 +104,30 @@ TEST_F(FitPoints, LidsAndLipsOfACartoonHeadAreFoundFromTenPoints) {
   }
 }
 
+TEST_F(FitPoints, PointsOfAFaceThatIsItsOwnMirrorImageAreToo) {
+  VOLTO_PLAIN_BUILD_ONLY();
+  const auto& points = featurePoints();
+  for (const KnownHead* head : {adult_, creature_}) {
+    const FittedPoints fitted = fitPoints(head->mesh, head->told(kTenPoints));
+    for (std::size_t p = 0; p < kFeaturePointCount; ++p) {
+      const Eigen::RowVector3d at = fitted.positions.row(static_cast<Eigen::Index>(p)),
+                               other = fitted.positions.row(static_cast<Eigen::Index>(points[p].mirror));
+      EXPECT_LT((at - other.cwiseProduct(Eigen::RowVector3d(-1, 1, 1))).norm() / head->eyeSeparation(), 2e-3)
+          << points[p].id;
+    }
+  }
+}
+
+TEST_F(FitPoints, OneSideOfAFaceThatIsItsOwnMirrorImageIsEnough) {
+  VOLTO_PLAIN_BUILD_ONLY();
+  constexpr std::array<std::string_view, 6> kLeftOrMiddle = {"3.7", "4.3", "9.3", "8.3", "2.1", "10.7"};
+  for (const unsigned seed : {0U, 5U}) {
+    const KnownHead placed = creature_->placedAnyhow(seed);
+    const double ten = test::errorOf(fitPoints(placed.mesh, placed.told(kTenPoints)), placed).mean;
+    EXPECT_LT(test::errorOf(fitPoints(placed.mesh, placed.told(kLeftOrMiddle)), placed).mean, 1.1 * ten);
+  }
+}
+
 TEST_F(FitPoints, MorePointsAreNeverWorse) {
   VOLTO_PLAIN_BUILD_ONLY();
   constexpr std::array<std::string_view, 4> kFour = {"3.7", "3.12", "9.3", "2.1"};
