@@ -51,4 +51,23 @@ class ClosestPoint {
   std::vector<Node> nodes_;
 };
 
+// Those of `triangles` that reach into the box and that `wanted` takes, in their order.
+template <class Wanted>
+std::vector<std::array<std::uint32_t, 3>> trianglesNear(const VertexPositions& positions,
+                                                        const std::vector<std::array<std::uint32_t, 3>>& triangles,
+                                                        const Eigen::Vector3d& low, const Eigen::Vector3d& high,
+                                                        const Wanted& wanted) {
+  std::vector<std::array<std::uint32_t, 3>> out;
+  for (const auto& t : triangles) {
+    bool apart = false;
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      const double a = positions(t[0], axis), b = positions(t[1], axis), c = positions(t[2], axis);
+      apart = apart || (a < low[axis] && b < low[axis] && c < low[axis]) ||
+              (a > high[axis] && b > high[axis] && c > high[axis]);
+    }
+    if (!apart && wanted(t)) out.push_back(t);
+  }
+  return out;
+}
+
 }  // namespace volto::rig

@@ -337,9 +337,8 @@ class ContactFinder {
     for (const auto& t : skin_.triangles)
       if (isSkin(t[0]) && isSkin(t[1]) && isSkin(t[2])) skin.push_back(t);
     if (skin.empty()) return;
-    const ClosestPoint surface(at_, skin);
     for (const RigidPart& part : rig_.rigid_parts)
-      if (part.follows == RigidPart::Follows::skin) addRiders(part, surface, skin);
+      if (part.follows == RigidPart::Follows::skin) addRiders(part, skin);
     std::sort(out_.riders.begin(), out_.riders.end(),
               [](const Rider& a, const Rider& b) { return a.vertex < b.vertex; });
   }
@@ -384,28 +383,24 @@ class ContactFinder {
     }
   }
 
-  void addRiders(const RigidPart& part, const ClosestPoint& all,
-                 const std::vector<std::array<std::uint32_t, 3>>& skin) {
+  void addRiders(const RigidPart& part, const std::vector<std::array<std::uint32_t, 3>>& skin) {
     const double near = 0.1 * es_;
     const SlitSide lid = lidOf(part);
-    std::optional<ClosestPoint> one_side;
-    if (lid != SlitSide::none) {
-      std::vector<std::array<std::uint32_t, 3>> triangles;
-      for (const auto& t : skin)
-        if (std::none_of(t.begin(), t.end(), [&](std::uint32_t v) { return opposite(association_.side[v], lid); }))
-          triangles.push_back(t);
-      if (triangles.empty()) return;
-      one_side.emplace(at_, std::move(triangles));
+    Eigen::Vector3d low = position(part.vertices.front()), high = low;
+    for (const std::uint32_t v : part.vertices) {
+      low = low.cwiseMin(position(v));
+      high = high.cwiseMax(position(v));
     }
-    const ClosestPoint& surface = one_side ? *one_side : all;
+    const ClosestPoint surface(at_, trianglesNear(at_, skin, low.array() - near, high.array() + near, [&](const auto& t) {
+      return lid == SlitSide::none ||
+             std::none_of(t.begin(), t.end(), [&](std::uint32_t v) { return opposite(association_.side[v], lid); });
+    }));
+    if (surface.empty()) return;
     std::vector<SurfacePoint> nearest;
     double closest = near;
-    Eigen::Vector3d low = position(part.vertices.front()), high = low;
     for (const std::uint32_t v : part.vertices) {
       nearest.push_back(surface.find(position(v), near));
       if (nearest.back().triangle >= 0) closest = std::min(closest, nearest.back().distance);
-      low = low.cwiseMin(position(v));
-      high = high.cwiseMax(position(v));
     }
     if (!(closest < near)) return;
     // A lash grows from its lid: what stands away from the skin goes with the nearest root.

@@ -5,6 +5,7 @@
 
 #include "rig/combined_expressions.h"
 #include "rig/contacts.h"
+#include "rig/parallel.h"
 #include "rig/pose.h"
 #include "rig/rig.h"
 #include "rig/skin.h"
@@ -110,38 +111,47 @@ FoldGuard guardAgainstFolds(const Rig& rig, const Skin& skin) {
   }
 
   // Every shape half way and all the way, every pair that has a correction, every combined expression.
-  std::vector<std::uint8_t> watched(triangles.size(), 0);
-  std::vector<Position> positions(neutral.size());
-  std::vector<float> weights(rig.blendshapes.size(), 0.0F);
+  std::vector<std::vector<float>> poses;
   Contacts contacts = rig.contacts;
   contacts.folds = {};
   contacts.riders.clear();
-  const auto look = [&] {
-    poseByOperator(rig, weights, neutral, positions);
-    addToPose(rig, weights, false, neutral, positions);
-    resolveContacts(contacts, neutral, positions);
-    for (std::size_t t = 0; t < triangles.size(); ++t) {
-      const auto& [a, b, c] = triangles[t];
-      const Vec3 now = cross(positions[b] - positions[a], positions[c] - positions[a]);
-      if (dot(normals[t], now) < kWatched * areas[t]) watched[t] = 1;
-    }
-    std::fill(weights.begin(), weights.end(), 0.0F);
-  };
-  for (std::size_t k = 0; k < weights.size(); ++k)
+  const std::vector<float> nothing(rig.blendshapes.size(), 0.0F);
+  for (std::size_t k = 0; k < nothing.size(); ++k)
     for (const float w : {0.5F, 1.0F}) {
-      weights[k] = w;
-      look();
+      poses.push_back(nothing);
+      poses.back()[k] = w;
     }
   for (const Combination& combination : rig.combinations) {
-    for (const Combination::Driver& driver : combination.drivers) weights[driver.shape] = driver.halfway ? 0.5F : 1.0F;
-    look();
+    poses.push_back(nothing);
+    for (const Combination::Driver& driver : combination.drivers)
+      poses.back()[driver.shape] = driver.halfway ? 0.5F : 1.0F;
   }
   for (const NamedPose& pose : combinedExpressions()) {
+    poses.push_back(nothing);
     for (const auto& [name, weight] : pose.weights)
-      for (std::size_t k = 0; k < weights.size(); ++k)
-        if (rig.blendshapes[k].name == name) weights[k] = weight;
-    look();
+      for (std::size_t k = 0; k < nothing.size(); ++k)
+        if (rig.blendshapes[k].name == name) poses.back()[k] = weight;
   }
+  // Some threads with a share of the poses each: what one of them sees is watched.
+  constexpr std::size_t kShares = 4;
+  std::array<std::vector<std::uint8_t>, kShares> seen;
+  parallelFor(kShares, [&](std::size_t share) {
+    seen[share].assign(triangles.size(), 0);
+    std::vector<Position> positions(neutral.size());
+    for (std::size_t i = share; i < poses.size(); i += kShares) {
+      poseByOperator(rig, poses[i], neutral, positions);
+      addToPose(rig, poses[i], false, neutral, positions);
+      resolveContacts(contacts, neutral, positions);
+      for (std::size_t t = 0; t < triangles.size(); ++t) {
+        const auto& [a, b, c] = triangles[t];
+        const Vec3 now = cross(positions[b] - positions[a], positions[c] - positions[a]);
+        if (dot(normals[t], now) < kWatched * areas[t]) seen[share][t] = 1;
+      }
+    }
+  });
+  std::vector<std::uint8_t> watched(triangles.size(), 0);
+  for (const std::vector<std::uint8_t>& by_one : seen)
+    for (std::size_t t = 0; t < watched.size(); ++t) watched[t] |= by_one[t];
 
   // And the rims of lids and lips, which every mixture of expressions presses against each other.
   constexpr float kRim = 0.9F;

@@ -1,6 +1,7 @@
 #include "rig/geodesic.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <queue>
@@ -9,12 +10,10 @@
 namespace volto::rig {
 
 EdgeGraph buildEdgeGraph(const Mesh& mesh, const Mesh& polygons, std::span<const std::uint32_t> same_as) {
-  std::vector<std::uint64_t> edges;
-  edges.reserve(polygons.corner_vertices.size() * 4);
-  const auto connect = [&edges](std::uint64_t a, std::uint64_t b) {
-    if (a == b) return;
-    edges.push_back(a << 32 | b);
-    edges.push_back(b << 32 | a);
+  std::vector<std::array<std::uint32_t, 2>> edges;
+  edges.reserve(polygons.corner_vertices.size() * 2);
+  const auto connect = [&edges](std::uint32_t a, std::uint32_t b) {
+    if (a != b) edges.push_back({a, b});
   };
   for (std::size_t p = 0; p < polygons.polygonCount(); ++p) {
     const std::uint32_t first = polygons.polygon_start[p];
@@ -28,21 +27,29 @@ EdgeGraph buildEdgeGraph(const Mesh& mesh, const Mesh& polygons, std::span<const
       for (std::uint32_t c = 2; c + 1 < corners; ++c) connect(corner(0), corner(c));
     }
   }
-  std::sort(edges.begin(), edges.end());
-  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
-
+  // Each vertex's own, which are few, in order.
+  std::vector<std::uint32_t> start(mesh.vertexCount() + 1, 0), both_ways(2 * edges.size());
+  for (const auto& edge : edges)
+    for (const std::uint32_t v : edge) ++start[v + 1];
+  for (std::size_t v = 0; v < mesh.vertexCount(); ++v) start[v + 1] += start[v];
+  std::vector<std::uint32_t> filled(start.begin(), start.end() - 1);
+  for (const auto& [a, b] : edges) {
+    both_ways[filled[a]++] = b;
+    both_ways[filled[b]++] = a;
+  }
   EdgeGraph graph;
   graph.start.assign(mesh.vertexCount() + 1, 0);
-  graph.neighbour.reserve(edges.size());
-  graph.length.reserve(edges.size());
-  for (const std::uint64_t edge : edges) {
-    const auto a = static_cast<std::uint32_t>(edge >> 32);
-    const auto b = static_cast<std::uint32_t>(edge);
-    ++graph.start[a + 1];
-    graph.neighbour.push_back(b);
-    graph.length.push_back(static_cast<float>((mesh.positions.row(a) - mesh.positions.row(b)).norm()));
+  graph.neighbour.reserve(both_ways.size());
+  graph.length.reserve(both_ways.size());
+  for (std::uint32_t v = 0; v < mesh.vertexCount(); ++v) {
+    const auto first = both_ways.begin() + start[v], last = both_ways.begin() + start[v + 1];
+    std::sort(first, last);
+    graph.neighbour.insert(graph.neighbour.end(), first, std::unique(first, last));
+    for (std::size_t e = graph.length.size(); e < graph.neighbour.size(); ++e)
+      graph.length.push_back(
+          static_cast<float>((mesh.positions.row(v) - mesh.positions.row(graph.neighbour[e])).norm()));
+    graph.start[v + 1] = static_cast<std::uint32_t>(graph.neighbour.size());
   }
-  for (std::size_t v = 0; v < mesh.vertexCount(); ++v) graph.start[v + 1] += graph.start[v];
   return graph;
 }
 

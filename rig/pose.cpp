@@ -185,7 +185,7 @@ std::vector<Position> neutralPositions(const Rig& rig) {
 
 void poseByOperator(const Rig& rig, std::span<const float> weights, std::span<const Position> neutral,
                     std::span<Position> positions) {
-  std::array<Position, kFeaturePointCount> mask{};
+  std::array<std::array<float, 4>, kFeaturePointCount> mask{};  // four lanes, the last unused
   for (std::size_t k = 0; k < weights.size(); ++k) {
     if (weights[k] == 0) continue;
     for (std::size_t p = 0; p < kFeaturePointCount; ++p)
@@ -194,9 +194,12 @@ void poseByOperator(const Rig& rig, std::span<const float> weights, std::span<co
   }
   const DeformationOperator& op = rig.deformation;
   for (std::size_t v = 0; v < neutral.size(); ++v) {
-    Position p{};
-    for (std::uint32_t e = op.row_start[v]; e < op.row_start[v + 1]; ++e)
-      for (std::size_t axis = 0; axis < 3; ++axis) p[axis] += op.weight[e] * mask[op.point[e]][axis];
+    std::array<float, 4> p{};
+    for (std::uint32_t e = op.row_start[v]; e < op.row_start[v + 1]; ++e) {
+      const float weight = op.weight[e];
+      const std::array<float, 4>& point = mask[op.point[e]];
+      for (std::size_t lane = 0; lane < 4; ++lane) p[lane] += weight * point[lane];
+    }
     for (std::size_t axis = 0; axis < 3; ++axis) positions[v][axis] = neutral[v][axis] + p[axis];
   }
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include <Eigen/Geometry>
 
@@ -35,6 +36,7 @@ PoseLab::PoseLab(const Rig& rig, const Skin& skin)
     if (a == b || b == c || c == a || !(normal.norm() > 1e-9F * es_ * es_)) return;
     triangles_.push_back({a, b, c});
     rest_normal_.push_back(normal);
+    rest_area_.push_back(normal.norm());
   };
   const Mesh& mesh = rig.neutral;
   for (std::size_t p = 0; p < mesh.polygonCount(); ++p) {
@@ -59,16 +61,57 @@ PoseLab::PoseLab(const Rig& rig, const Skin& skin)
     for (const std::uint32_t v : triangles_[t]) triangles_of_[filled[skin_.same_as[v]]++] = t;
   for (std::uint32_t v = 0; v < neutral_.size(); ++v)
     if (skin_.same_as[v] != v && free_[v]) doubles_.push_back(v);
-  for (const BallContact& ball : rig.contacts.balls)
-    in_contact_.insert(in_contact_.end(), ball.vertex.begin(), ball.vertex.end());
-  for (const SlitContact& slit : rig.contacts.slits)
-    in_contact_.insert(in_contact_.end(), slit.vertex.begin(), slit.vertex.end());
   slit_of_.assign(neutral_.size(), -1);
   for (std::size_t k = 0; k < rig.contacts.slits.size(); ++k)
     for (const std::uint32_t v : rig.contacts.slits[k].vertex)
       slit_of_[skin_.same_as[v]] = static_cast<std::int32_t>(k);
-  std::sort(in_contact_.begin(), in_contact_.end());
-  in_contact_.erase(std::unique(in_contact_.begin(), in_contact_.end()), in_contact_.end());
+  groupContacts();
+}
+
+void PoseLab::groupContacts() {
+  const Contacts& all = rig_.contacts;
+  const std::size_t balls = all.balls.size(), count = balls + all.slits.size();
+  std::vector<std::vector<std::uint8_t>> reads(count, std::vector<std::uint8_t>(neutral_.size(), 0));
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::vector<std::uint32_t>& vertices = i < balls ? all.balls[i].vertex : all.slits[i - balls].vertex;
+    for (const std::uint32_t v : vertices) reads[i][v] = 1;
+    if (i < balls) continue;
+    for (const auto* side : {&all.slits[i - balls].upper, &all.slits[i - balls].lower})
+      for (const SlitContact::Sample& s : *side) reads[i][s.first] = reads[i][s.second] = 1;
+  }
+  std::vector<std::size_t> group(count);
+  std::iota(group.begin(), group.end(), std::size_t{0});
+  for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      bool shared = (i >= balls && all.slits[i - balls].ball == static_cast<std::int32_t>(j));
+      for (std::size_t v = 0; v < neutral_.size() && !shared; ++v) shared = (reads[i][v] & reads[j][v]) != 0;
+      if (!shared) continue;
+      const std::size_t from = std::max(group[i], group[j]), to = std::min(group[i], group[j]);
+      std::replace(group.begin(), group.end(), from, to);
+    }
+  for (std::size_t g = 0; g < count; ++g) {
+    if (group[g] != g) continue;
+    ContactGroup out;
+    out.reads.assign(neutral_.size(), 0);
+    std::vector<std::int32_t> new_index(balls, -1);
+    for (std::size_t i = 0; i < count; ++i) {
+      if (group[i] != g) continue;
+      for (std::size_t v = 0; v < neutral_.size(); ++v) out.reads[v] |= reads[i][v];
+      const std::vector<std::uint32_t>& vertices = i < balls ? all.balls[i].vertex : all.slits[i - balls].vertex;
+      out.vertices.insert(out.vertices.end(), vertices.begin(), vertices.end());
+      if (i < balls) {
+        new_index[i] = static_cast<std::int32_t>(out.contacts.balls.size());
+        out.contacts.balls.push_back(all.balls[i]);
+      } else {
+        out.contacts.slits.push_back(all.slits[i - balls]);
+        std::int32_t& ball = out.contacts.slits.back().ball;
+        if (ball >= 0) ball = new_index[static_cast<std::size_t>(ball)];
+      }
+    }
+    std::sort(out.vertices.begin(), out.vertices.end());
+    out.vertices.erase(std::unique(out.vertices.begin(), out.vertices.end()), out.vertices.end());
+    contact_groups_.push_back(std::move(out));
+  }
 }
 
 void PoseLab::setWeights(std::span<const float> weights) {
@@ -77,8 +120,10 @@ void PoseLab::setWeights(std::span<const float> weights) {
 }
 
 const std::vector<Position>& PoseLab::evaluate(const DenseDisplacement& extra) {
-  for (std::uint32_t v = 0; v < positions_.size(); ++v) place(v, extra);
-  resolveContacts(rig_.contacts, neutral_, positions_);
+  for (std::size_t v = 0; v < positions_.size(); ++v)
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      positions_[v][axis] = base_[v][axis] + extra[v].data()[axis];
+  for (const ContactGroup& group : contact_groups_) resolveContacts(group.contacts, neutral_, positions_);
   return positions_;
 }
 
@@ -96,7 +141,7 @@ float PoseLab::uprightness(std::size_t triangle) const {
   const auto& [a, b, c] = triangles_[triangle];
   if (positions_[a] == neutral_[a] && positions_[b] == neutral_[b] && positions_[c] == neutral_[c]) return 1;
   const Eigen::Vector3f now = (at(b) - at(a)).cross(at(c) - at(a));
-  const float rest = rest_normal_[triangle].norm(), area = now.norm();
+  const float rest = rest_area_[triangle], area = now.norm();
   return area > kLeastArea * rest ? now.dot(rest_normal_[triangle]) / (area * rest) : -1.0F;
 }
 
@@ -109,8 +154,12 @@ bool PoseLab::unfold(DenseDisplacement& extra, std::span<const std::uint32_t> he
     if (suspected[t] == 0) suspects.push_back(t);
     suspected[t] = 1;
   };
-  for (std::uint32_t t = 0; t < triangles_.size(); ++t)
-    if (uprightness(t) < kLeaning) suspect(t);
+  std::vector<std::uint8_t> away(neutral_.size());
+  for (std::size_t v = 0; v < away.size(); ++v) away[v] = positions_[v] != neutral_[v] ? 1 : 0;
+  for (std::uint32_t t = 0; t < triangles_.size(); ++t) {
+    const auto& [a, b, c] = triangles_[t];
+    if ((away[a] | away[b] | away[c]) != 0 && uprightness(t) < kLeaning) suspect(t);
+  }
   if (suspects.empty()) return true;
 
   std::vector<std::uint32_t> region, copies, seeds;
@@ -119,9 +168,15 @@ bool PoseLab::unfold(DenseDisplacement& extra, std::span<const std::uint32_t> he
   // Where lips or lids are relaxed, the push of their contact becomes part of the correction: it would be made again on
   // top of itself.
   std::vector<std::uint8_t> kept(rig_.contacts.slits.size(), 0), to_keep(kept);
+  // Contacts that nothing of the region has to do with stay as evaluate() left them.
+  std::vector<std::uint8_t> touched(contact_groups_.size(), 0);
+  const auto touch = [&](std::uint32_t v) {
+    for (std::size_t g = 0; g < touched.size(); ++g) touched[g] |= contact_groups_[g].reads[v];
+  };
   const auto addToRegion = [&](std::uint32_t v) {
     if (in_region[v] != 0 || !free_[v]) return;
     in_region[v] = 1;
+    touch(v);
     region.push_back(v);
     if (slit_of_[v] >= 0) to_keep[static_cast<std::size_t>(slit_of_[v])] = 1;
     for (std::uint32_t i = triangles_of_start_[v]; i < triangles_of_start_[v + 1]; ++i) suspect(triangles_of_[i]);
@@ -196,9 +251,13 @@ bool PoseLab::unfold(DenseDisplacement& extra, std::span<const std::uint32_t> he
       if (in_region[skin_.same_as[v]] != 0) {
         extra[v] = extra[skin_.same_as[v]];
         place(v, extra);
+        touch(v);
       }
-    for (const std::uint32_t v : in_contact_) place(v, extra);
-    resolveContacts(rig_.contacts, neutral_, positions_);
+    for (const ContactGroup& group : contact_groups_) {
+      if (touched[static_cast<std::size_t>(&group - contact_groups_.data())] == 0) continue;
+      for (const std::uint32_t v : group.vertices) place(v, extra);
+      resolveContacts(group.contacts, neutral_, positions_);
+    }
   }
   extra = std::move(best);
   evaluate(extra);

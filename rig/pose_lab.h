@@ -48,15 +48,24 @@ class PoseLab {
   void place(std::uint32_t v, const DenseDisplacement& extra);
   float uprightness(std::size_t triangle) const;  // cosine of the angle it turned by; -1 without area
 
+  // Contacts that have vertices in common, of balls and slits; what else moves does not move these.
+  struct ContactGroup {
+    Contacts contacts;                   // without riders, which are no skin
+    std::vector<std::uint32_t> vertices;  // that they may move, ascending
+    std::vector<std::uint8_t> reads;      // #V: whether they depend on it
+  };
+  void groupContacts();
+
   const Rig& rig_;
   const Skin& skin_;
   float es_;
   std::vector<Position> neutral_, base_, positions_;
   std::vector<std::array<std::uint32_t, 3>> triangles_;
   std::vector<Eigen::Vector3f> rest_normal_;
+  std::vector<float> rest_area_;  // twice it
   std::vector<std::uint32_t> triangles_of_start_, triangles_of_;  // of each standing vertex
   std::vector<std::uint32_t> doubles_;                            // vertices that another one stands for
-  std::vector<std::uint32_t> in_contact_;  // vertices that resolveContacts may move, riders aside
+  std::vector<ContactGroup> contact_groups_;
   std::vector<std::int32_t> slit_of_;      // #V: the slit where it gives way, -1
   std::vector<bool> free_;                 // skin that may be corrected
 };

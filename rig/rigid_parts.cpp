@@ -11,6 +11,7 @@
 
 #include "rig/closest_point.h"
 #include "rig/errors.h"
+#include "rig/parallel.h"
 
 namespace volto::rig {
 namespace {
@@ -94,9 +95,10 @@ class PartPlacer {
         rows_(rows),
         at_((mesh.positions * place.mesh_from_head) / place.eye_separation),
         points_((place.points * place.mesh_from_head) / place.eye_separation),
-        surface_(at_, skinTriangles()) {
+        skin_triangles_(skinTriangles()) {
     mouth_ = (point("2.2") + point("2.3")) / 2;
     mouth_width_ = std::max((point("8.3") - point("8.4")).norm(), 0.1);
+    prepareJaw();
   }
 
   PlacedParts place(const std::vector<PartEdit>& edits) {
@@ -278,19 +280,20 @@ class PartPlacer {
   // Weights that carry the affine motion which the jaw's points have in the least-squares sense. Skin follows the bone
   // under it only in part, the less the farther back: on the ICT head the chin nearly all the way, the jaw line and the
   // corner of the jaw as said here.
-  OperatorRow jawRow(const Eigen::Vector3d& at) const {
-    struct JawPoint {
-      std::string_view id;
-      double trust, follows_bone;
-    };
-    static constexpr std::array<JawPoint, 8> kJaw = {{{"2.1", 1.0, 1.0},
-                                                      {"2.10", 1.0, 1.0},
-                                                      {"2.11", 1.0, 1.0},
-                                                      {"2.12", 1.0, 1.0},
-                                                      {"12.17", 0.7, 0.85},
-                                                      {"12.18", 0.7, 0.85},
-                                                      {"2.13", 0.4, 0.42},
-                                                      {"2.14", 0.4, 0.42}}};
+  struct JawPoint {
+    std::string_view id;
+    double trust, follows_bone;
+  };
+  static constexpr std::array<JawPoint, 8> kJaw = {{{"2.1", 1.0, 1.0},
+                                                    {"2.10", 1.0, 1.0},
+                                                    {"2.11", 1.0, 1.0},
+                                                    {"2.12", 1.0, 1.0},
+                                                    {"12.17", 0.7, 0.85},
+                                                    {"12.18", 0.7, 0.85},
+                                                    {"2.13", 0.4, 0.42},
+                                                    {"2.14", 0.4, 0.42}}};
+
+  void prepareJaw() {
     Eigen::Matrix<double, 4, 4> normal = Eigen::Matrix4d::Zero();
     Eigen::Matrix<double, 4, 8> columns;
     for (std::size_t i = 0; i < kJaw.size(); ++i) {
@@ -300,11 +303,16 @@ class PartPlacer {
       columns.col(static_cast<Eigen::Index>(i)) = kJaw[i].trust / kJaw[i].follows_bone * b;
     }
     normal.diagonal().tail<3>().array() += 0.01;  // points in one plane say nothing of what happens away from it
+    jaw_ = normal.ldlt().solve(columns);
+    for (std::size_t i = 0; i < kJaw.size(); ++i) jaw_point_[i] = pointIndex(kJaw[i].id);
+  }
+
+  OperatorRow jawRow(const Eigen::Vector3d& at) const {
     Eigen::Vector4d b;
     b << 1.0, at - mouth_;
-    const Eigen::Matrix<double, 1, 8> weights = normal.ldlt().solve(b).transpose() * columns;
+    const Eigen::Matrix<double, 1, 8> weights = b.transpose() * jaw_;
     OperatorRow row{};
-    for (std::size_t i = 0; i < kJaw.size(); ++i) row[pointIndex(kJaw[i].id)] = weights[static_cast<Eigen::Index>(i)];
+    for (std::size_t i = 0; i < kJaw.size(); ++i) row[jaw_point_[i]] = weights[static_cast<Eigen::Index>(i)];
     return row;
   }
 
@@ -365,9 +373,11 @@ class PartPlacer {
       std::vector<GeodesicSource> out;
       for (const std::uint32_t v : part.vertices) {
         if (!skin_.stands(v)) continue;
-        double nearest = 0.04 * mouth_width_;
-        for (const std::uint32_t t : teeth) nearest = std::min(nearest, (at_.row(v) - at_.row(t)).norm());
-        if (nearest < 0.04 * mouth_width_) out.push_back({v, 0.0F});
+        const double near = 0.04 * mouth_width_;
+        if (std::any_of(teeth.begin(), teeth.end(), [&](std::uint32_t t) {
+              return std::abs(at_(v, 0) - at_(t, 0)) < near && (at_.row(v) - at_.row(t)).norm() < near;
+            }))
+          out.push_back({v, 0.0F});
       }
       return out;
     };
@@ -425,24 +435,19 @@ class PartPlacer {
     constexpr double kReach = 0.35;
     const bool small = (part.high - part.low).norm() < 0.9;
     const SlitSide lid = small ? lidOf(part) : SlitSide::none;
-    const ClosestPoint* surface = &surface_;
-    std::optional<ClosestPoint> one_side;
-    if (lid != SlitSide::none) {
-      std::vector<std::array<std::uint32_t, 3>> triangles;
-      for (const auto& t : skinTriangles())
-        if (std::none_of(t.begin(), t.end(), [&](std::uint32_t v) { return opposite(association_.side[v], lid); }))
-          triangles.push_back(t);
-      one_side.emplace(at_, std::move(triangles));
-      surface = &*one_side;
-    }
+    // What is no farther than that from the part: few triangles, mostly.
+    const ClosestPoint surface(at_, trianglesNear(at_, skin_triangles_, part.low.array() - kReach, part.high.array() + kReach, [&](const auto& t) {
+      return lid == SlitSide::none ||
+             std::none_of(t.begin(), t.end(), [&](std::uint32_t v) { return opposite(association_.side[v], lid); });
+    }));
     std::vector<SurfacePoint> nearest(part.vertices.size());
     double closest = kReach;
     for (std::size_t i = 0; i < part.vertices.size(); ++i) {
-      nearest[i] = surface->find(at_.row(part.vertices[i]).transpose(), kReach);
+      nearest[i] = surface.find(at_.row(part.vertices[i]).transpose(), kReach);
       if (nearest[i].triangle >= 0) closest = std::min(closest, nearest[i].distance);
     }
     const auto cornersAt = [&](const SurfacePoint& on_skin, double share, std::int16_t& triangle) {
-      const auto& corners = surface->triangle(on_skin.triangle);
+      const auto& corners = surface.triangle(on_skin.triangle);
       std::vector<std::pair<std::uint32_t, double>> of;
       triangle = -1;
       double most = -1;
@@ -481,10 +486,14 @@ class PartPlacer {
         auto of = cornersAt(nearest[i], 1.0, triangle);
         roots.push_back({at_.row(part.vertices[i]), std::move(of), triangle});
       }
-    std::vector<double> share(roots.size());
-    for (const std::uint32_t v : part.vertices) {
+    std::vector<Binding> bindings(part.vertices.size());
+    std::vector<std::int16_t> triangles(part.vertices.size());
+    parallelFor(part.vertices.size(), [&](std::size_t i) {
+      const std::uint32_t v = part.vertices[i];
+      std::vector<double> share(roots.size());
       double total = 0, largest = 0;
-      std::int16_t triangle = -1;
+      std::int16_t& triangle = triangles[i];
+      triangle = -1;
       for (std::size_t r = 0; r < roots.size(); ++r) {
         const double near = 1 / ((roots[r].at - at_.row(v).transpose()).squaredNorm() + 1e-6);
         share[r] = near * near;
@@ -499,8 +508,9 @@ class PartPlacer {
         if (share[r] < 1e-6 * total) continue;  // compact() would drop them, one by one
         for (const auto& [of, weight] : roots[r].of) binding.of.emplace_back(of, share[r] / total * weight);
       }
-      bind(compact(std::move(binding)), triangle);
-    }
+      bindings[i] = compact(std::move(binding));
+    });
+    for (std::size_t i = 0; i < bindings.size(); ++i) bind(std::move(bindings[i]), triangles[i]);
   }
 
   // One entry per vertex, without those that say next to nothing; the sum stays.
@@ -528,9 +538,11 @@ class PartPlacer {
   SkinRows& rows_;
   VertexPositions at_;
   FeaturePointPositions points_;
-  ClosestPoint surface_;
+  std::vector<std::array<std::uint32_t, 3>> skin_triangles_;
   Eigen::Vector3d mouth_;
   double mouth_width_ = 1;
+  Eigen::Matrix<double, 4, 8> jaw_;  // jawRow() is linear in (1, place)
+  std::array<std::size_t, 8> jaw_point_{};
   std::vector<Component> components_;
   std::vector<bool> done_;
   std::vector<RigidPart> parts_;

@@ -1,10 +1,11 @@
 #include "rig/skin_equations.h"
 
 #include <algorithm>
-#include <stdexcept>
+#include <optional>
 
-#include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
+
+#include "rig/sparse_cholesky.h"
 
 namespace volto::rig {
 namespace {
@@ -27,9 +28,7 @@ struct SkinEquations::State {
   };
   std::vector<double> data_scale;  // per unknown
   std::vector<Held> held;
-  Sparse lower;  // of the factors, unit diagonal left out
-  Eigen::VectorXd diagonal;
-  Eigen::VectorXi order;  // row of the factors -> unknown
+  std::optional<SparseCholesky> factors;
 };
 
 SkinEquations::SkinEquations(const Skin& skin, std::span<const std::int32_t> unknown,
@@ -109,39 +108,18 @@ SkinEquations::SkinEquations(const Skin& skin, std::span<const std::int32_t> unk
   entries = {};
   system = Sparse(system.triangularView<Eigen::Lower>()) + more;
 
-  const Eigen::SimplicialLDLT<Sparse, Eigen::Lower> factors(system);
-  if (factors.info() != Eigen::Success) throw std::runtime_error("rigging: the skin's equations cannot be solved");
-  state_->lower = factors.matrixL().nestedExpression();
-  state_->diagonal = factors.vectorD();
-  state_->order.resize(unknowns);
-  for (Eigen::Index i = 0; i < unknowns; ++i) {
-    const Eigen::Index row = factors.permutationP().size() > 0 ? factors.permutationP().indices()[i] : i;
-    state_->order[row] = static_cast<int>(i);
-  }
+  state_->factors.emplace(system);
 }
 
 SkinEquations::~SkinEquations() = default;
 SkinEquations::SkinEquations(SkinEquations&&) noexcept = default;
 SkinEquations& SkinEquations::operator=(SkinEquations&&) noexcept = default;
 
-// Forward and back over the factors once for all columns: a row of the right side is contiguous, and the factors, which
-// are large, come from memory once.
 void SkinEquations::solve(const Columns& values, Columns& data) const {
   const State& s = *state_;
-  const Eigen::Index unknowns = data.rows();
-  for (Eigen::Index row = 0; row < unknowns; ++row) data.row(row) *= s.data_scale[static_cast<std::size_t>(row)];
+  for (Eigen::Index row = 0; row < data.rows(); ++row) data.row(row) *= s.data_scale[static_cast<std::size_t>(row)];
   for (const State::Held& h : s.held) data.row(h.unknown) += h.weight * values.row(h.point);
-  Columns x(unknowns, data.cols());
-  for (Eigen::Index i = 0; i < unknowns; ++i) x.row(i) = data.row(s.order[i]);
-  for (Eigen::Index j = 0; j < unknowns; ++j)
-    for (Sparse::InnerIterator it(s.lower, j); it; ++it)
-      if (it.row() > j) x.row(it.row()).noalias() -= it.value() * x.row(j);
-  for (Eigen::Index j = unknowns; j-- > 0;) {
-    x.row(j) /= s.diagonal[j];
-    for (Sparse::InnerIterator it(s.lower, j); it; ++it)
-      if (it.row() > j) x.row(j).noalias() -= it.value() * x.row(it.row());
-  }
-  for (Eigen::Index i = 0; i < unknowns; ++i) data.row(s.order[i]) = x.row(i);
+  s.factors->solve(data);
 }
 
 }  // namespace volto::rig

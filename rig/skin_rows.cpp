@@ -216,6 +216,11 @@ Columns SkinInterpolation::displace(const Columns& points) const {
 // or its two halves would part at a line that depends on how the mesh is cut.
 std::array<std::vector<float>, 7> SkinInterpolation::State::toOppositeSide() const {
   std::array<std::vector<float>, 7> out;
+  // Where the opposite side is farther than a point, the point has its full weight (step 3).
+  const double across = (mask.geometry.points.colwise().maxCoeff() - mask.geometry.points.colwise().minCoeff()).norm();
+  const float limit = mask.points.size() > kFeaturePointCount
+                          ? std::max(problem.association.reach, static_cast<float>(2 * across))
+                          : problem.association.reach;
   parallelFor(6, [&](std::size_t k) {
     const auto side = static_cast<SlitSide>(k + 1);
     std::vector<GeodesicSource> others;
@@ -225,7 +230,7 @@ std::array<std::vector<float>, 7> SkinInterpolation::State::toOppositeSide() con
     for (std::size_t p = 0; p < kFeaturePointCount; ++p)
       if (opposite(slitSide(p), side))
         others.insert(others.end(), problem.feature_points[p].around.begin(), problem.feature_points[p].around.end());
-    if (!others.empty()) out[k + 1] = surfaceDistances(problem.skin.graph, others).distance;
+    if (!others.empty()) out[k + 1] = surfaceDistances(problem.skin.graph, others, limit).distance;
   });
   return out;
 }

@@ -16,6 +16,7 @@
 #include "rig/fitting/registration.h"
 #include "rig/fitting/target_surface.h"
 #include "rig/fitting/visible_triangles.h"
+#include "rig/parallel.h"
 #include "rig/skin.h"
 #include "rig/weld.h"
 
@@ -351,7 +352,14 @@ FeaturePointPositions normalsAtPoints(const GenericHead& head,
 CheckedPoints checkPoints(const Mesh& mesh, const FeaturePointChoices& given) {
   constexpr double kFarOff_es = 0.5;  // and three times as far as is usual on this face
   requireUsable(mesh, given, {});
-  const Target on_mesh(mesh, given, {});
+  std::optional<Target> prepared;
+  parallelFor(2, [&](std::size_t which) {
+    if (which == 0)
+      prepared.emplace(mesh, given, std::span<const RoughPoint>());
+    else
+      genericHead();  // the first to ask for it waits until it is bent
+  });
+  const Target& on_mesh = *prepared;
   const GenericHead& head = genericHead();
   std::vector<PlacedLandmark> landmarks = on_mesh.landmarks();
   FacePlacement placed = placeFace(landmarks, head.human.points, normalsAtPoints(head, triangulate(head.face)), on_mesh.insideOut());

@@ -22,11 +22,14 @@ double covariance(const Eigen::Vector3d& x, const Eigen::Vector3d& y) {
   return kPlace + kProportion * x.dot(y) + kLocal * (kReach - (x - y).norm());
 }
 
-// Of the displacements at x and y along the x axis (kind 0) or along y or z (kind 1).
+// Of the displacements at x and y along the x axis (kind 0) and along y or z (kind 1).
+std::array<double, 2> sidedCovariances(const Eigen::Vector3d& x, const Eigen::Vector3d& y) {
+  const double same = covariance(x, y), mirrored = covariance({-x.x(), x.y(), x.z()}, y);
+  return {(same - mirrored) / 2 + kOneSided * same, (same + mirrored) / 2 + kOneSided * same};
+}
+
 double sidedCovariance(const Eigen::Vector3d& x, const Eigen::Vector3d& y, int kind) {
-  const Eigen::Vector3d mirrored(-x.x(), x.y(), x.z());
-  const double same = covariance(x, y);
-  return (same + (kind == 0 ? -1 : 1) * covariance(mirrored, y)) / 2 + kOneSided * same;
+  return sidedCovariances(x, y)[static_cast<std::size_t>(kind)];
 }
 
 }  // namespace
@@ -92,8 +95,7 @@ Eigen::Vector3d LandmarkWarp::operator()(const Eigen::Vector3d& x) const {
   Eigen::Vector3d out = x;
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
-    const double along_x = sidedCovariance(x, landmarks_[i].from, 0);
-    const double along_yz = sidedCovariance(x, landmarks_[i].from, 1);
+    const auto [along_x, along_yz] = sidedCovariances(x, landmarks_[i].from);
     out += weights_.row(row).transpose().cwiseProduct(Eigen::Vector3d(along_x, along_yz, along_yz));
   }
   return out;
