@@ -82,26 +82,17 @@ GeodesicDistances geodesicDistances(const EdgeGraph& graph, std::span<const Geod
 
 namespace {
 
-// Distance at the third corner of a triangle from those at the ends of its base; infinite where the straight way does
-// not cross the base. The corner lies `to_a` and `to_b` from the ends, which are `base` apart. `one_source`: both ends
-// are nearest to the same one; else a straight front comes from many (Kimmel, Sethian 1998), or a line of sources beside
-// a long edge would be taken for a point on it.
-float acrossTriangle(float a, float b, float base, float to_a, float to_b, bool one_source) {
+// Distance at the third corner of a triangle from those at the ends of its base, of a front that is straight across the
+// triangle (Kimmel and Sethian, "Computing geodesic paths on manifolds"); infinite where it does not come across the
+// base. The corner lies `to_a` and `to_b` from the ends, which are `base` apart.
+float acrossTriangle(float a, float b, float base, float to_a, float to_b) {
   if (!(base > 0)) return kUnreached;
   const float x = (to_a * to_a - to_b * to_b + base * base) / (2 * base);
   const float y = std::sqrt(std::max(0.0F, to_a * to_a - x * x));
-  if (!(y > 1e-4F * base)) return kUnreached;
-  if (!one_source) {
-    const float along = (b - a) / base;
-    if (!(std::abs(along) < 1)) return kUnreached;
-    const float onward = std::sqrt(1 - along * along), crossing = x - along / onward * y;
-    return crossing >= 0 && crossing <= base ? a + along * x + onward * y : kUnreached;
-  }
-  const float source_x = (a * a - b * b + base * base) / (2 * base);
-  const float source_y = std::sqrt(std::max(0.0F, a * a - source_x * source_x));
-  const float crossing = source_x + (x - source_x) * source_y / (source_y + y);
-  if (!(crossing >= 0 && crossing <= base)) return kUnreached;
-  return std::hypot(x - source_x, y + source_y);
+  const float along = (b - a) / base;
+  if (!(y > 1e-4F * base) || !(std::abs(along) < 1)) return kUnreached;
+  const float onward = std::sqrt(1 - along * along), crossing = x - along / onward * y;
+  return crossing >= 0 && crossing <= base ? a + along * x + onward * y : kUnreached;
 }
 
 }  // namespace
@@ -135,8 +126,7 @@ GeodesicDistances surfaceDistances(const EdgeGraph& graph, std::span<const Geode
       while (i < graph.start[v + 1] && j < graph.start[u + 1]) {
         const std::uint32_t a = graph.neighbour[i], b = graph.neighbour[j];
         if (a == b && settled[a]) {
-          const float across = acrossTriangle(distance, out.distance[a], graph.length[i], graph.length[e], graph.length[j],
-                                              source == out.nearest_source[a]);
+          const float across = acrossTriangle(distance, out.distance[a], graph.length[i], graph.length[e], graph.length[j]);
           offer(std::max(across, distance), source, u);
         }
         i += a <= b ? 1 : 0;

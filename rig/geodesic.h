@@ -42,10 +42,10 @@ struct GeodesicDistances {
 GeodesicDistances geodesicDistances(const EdgeGraph& graph, std::span<const GeodesicSource> sources,
                                     float limit = kUnreached);
 
-// The same across the triangles of the surface too, not along their edges alone: a path may enter a triangle of the
-// graph through an edge whose both ends are known (the source unfolded into the triangle's plane, as in Novotni and
-// Klein, "Computing geodesic distances on triangular meshes"). What comes out hardly depends on how the surface is cut
-// into triangles; several times slower. Sources side by side count with the edge between them.
+// The same across the triangles of the surface too, not along their edges alone: where two corners of a triangle are
+// known, a straight front passes over it to the third (Kimmel and Sethian, "Computing geodesic paths on manifolds").
+// What comes out hardly depends on how the surface is cut into triangles; several times slower. Good for regions as
+// sources; near a single one the front is rounder than that, and distances come out a little long.
 GeodesicDistances surfaceDistances(const EdgeGraph& graph, std::span<const GeodesicSource> sources,
                                    float limit = kUnreached);
 
