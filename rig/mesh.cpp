@@ -60,15 +60,19 @@ MeshHealth inspectMesh(const Mesh& mesh) {
   return health;
 }
 
+bool sameTopology(const Mesh& a, const Mesh& b) {
+  return a.vertexCount() == b.vertexCount() && a.polygon_start == b.polygon_start &&
+         a.corner_vertices == b.corner_vertices;
+}
+
 void requireSameTopology(const Mesh& neutral, const Mesh& other, const std::string& name_for_errors) {
+  if (sameTopology(neutral, other)) return;
   if (other.vertexCount() != neutral.vertexCount() || other.polygonCount() != neutral.polygonCount())
     throw InputError(name_for_errors + ": " + std::to_string(other.vertexCount()) + " vertices and " +
                      std::to_string(other.polygonCount()) + " polygons, the neutral mesh has " +
                      std::to_string(neutral.vertexCount()) + " and " + std::to_string(neutral.polygonCount()) +
                      "; an expression must be the same mesh, moved");
-  if (other.polygon_start != neutral.polygon_start || other.corner_vertices != neutral.corner_vertices)
-    throw InputError(name_for_errors +
-                     ": as many vertices and polygons as the neutral mesh, but joined in another way");
+  throw InputError(name_for_errors + ": as many vertices and polygons as the neutral mesh, but joined in another way");
 }
 
 }  // namespace volto::rig

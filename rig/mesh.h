@@ -57,6 +57,9 @@ struct MeshHealth {
 };
 MeshHealth inspectMesh(const Mesh& mesh);
 
+// Whether both are the same mesh, vertex by vertex and polygon by polygon, with vertices moved.
+bool sameTopology(const Mesh& a, const Mesh& b);
+
 // Throws InputError when `other` is not the same mesh as `neutral` with vertices moved; names both counts.
 void requireSameTopology(const Mesh& neutral, const Mesh& other, const std::string& name_for_errors);
 

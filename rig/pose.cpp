@@ -174,14 +174,15 @@ void checkContacts(const Contacts& contacts, std::size_t vertices) {
 
 }  // namespace
 
-std::vector<Position> neutralPositions(const Rig& rig) {
-  std::vector<Position> out(rig.neutral.vertexCount());
+std::vector<Position> inSinglePrecision(const VertexPositions& positions) {
+  std::vector<Position> out(static_cast<std::size_t>(positions.rows()));
   for (std::size_t v = 0; v < out.size(); ++v)
     for (std::size_t axis = 0; axis < 3; ++axis)
-      out[v][axis] =
-          static_cast<float>(rig.neutral.positions(static_cast<Eigen::Index>(v), static_cast<Eigen::Index>(axis)));
+      out[v][axis] = static_cast<float>(positions(static_cast<Eigen::Index>(v), static_cast<Eigen::Index>(axis)));
   return out;
 }
+
+std::vector<Position> neutralPositions(const Rig& rig) { return inSinglePrecision(rig.neutral.positions); }
 
 void poseByOperator(const Rig& rig, std::span<const float> weights, std::span<const Position> neutral,
                     std::span<Position> positions) {

@@ -12,6 +12,7 @@ namespace volto::rig {
 
 using Position = std::array<float, 3>;
 
+std::vector<Position> inSinglePrecision(const VertexPositions& positions);
 std::vector<Position> neutralPositions(const Rig& rig);
 
 // positions = neutral + operator x (sum of weight x mask displacement), in plain single precision: the reference for

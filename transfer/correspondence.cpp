@@ -57,32 +57,6 @@ std::vector<std::array<std::uint32_t, 3>> trusted(const std::vector<std::array<s
   return out;
 }
 
-Eigen::Vector3d normalOf(const rig::VertexPositions& p, const std::array<std::uint32_t, 3>& t) {
-  const Eigen::Vector3d a = p.row(t[0]), b = p.row(t[1]), c = p.row(t[2]);
-  const Eigen::Vector3d n = (b - a).cross(c - a);
-  const double length = n.norm();
-  return length > 0 ? Eigen::Vector3d(n / length) : Eigen::Vector3d::Zero();
-}
-
-// The skin: the triangles of what is no separate part. `index`: of each in the whole list.
-struct SkinTriangles {
-  std::vector<std::array<std::uint32_t, 3>> triangles;
-  std::vector<std::int32_t> index;
-};
-SkinTriangles skinOf(const rig::Rig& rig) {
-  std::vector<bool> part(rig.neutral.vertexCount(), false);
-  for (const rig::RigidPart& p : rig.rigid_parts)
-    for (const std::uint32_t v : p.vertices) part[v] = true;
-  SkinTriangles out;
-  const auto all = rig::triangulate(rig.neutral);
-  for (std::size_t t = 0; t < all.size(); ++t) {
-    if (part[all[t][0]]) continue;
-    out.triangles.push_back(all[t]);
-    out.index.push_back(static_cast<std::int32_t>(t));
-  }
-  return out;
-}
-
 // Whether the mesh's triangles face outwards as the generic face's do: an inside-out mesh is turned for the search.
 bool facesInwards(const rig::VertexPositions& positions, const SkinTriangles& skin, const FaceOnHead& face,
                   const std::vector<std::array<std::uint32_t, 3>>& face_triangles) {
@@ -103,11 +77,6 @@ void turnOver(SkinTriangles& skin) {
   for (auto& t : skin.triangles) std::swap(t[1], t[2]);
 }
 
-Eigen::Vector3d sampleOf(const rig::Rig& rig, const rig::SlitContact::Sample& s) {
-  return (1 - s.share_of_second) * rig.neutral.positions.row(s.first) +
-         s.share_of_second * rig.neutral.positions.row(s.second);
-}
-
 SurfacePoint pointOf(const rig::SlitContact::Sample& s) {
   return {{s.first, s.second, s.first}, {1.0 - s.share_of_second, s.share_of_second, 0}};
 }
@@ -124,7 +93,7 @@ Correspondence correspondThroughGenericHead(const rig::Rig& source, const rig::R
     throw rig::InputError(
         "no place of the face was found on both heads; check their feature points with volto inspect --picture");
 
-  SkinTriangles source_skin = skinOf(source), target_skin = skinOf(target);
+  SkinTriangles source_skin = skinTriangles(source), target_skin = skinTriangles(target);
   if (facesInwards(source.neutral.positions, source_skin, faces[0], both)) turnOver(source_skin);
   const bool target_inwards = facesInwards(target.neutral.positions, target_skin, faces[1], both);
   if (target_inwards) turnOver(target_skin);
@@ -138,9 +107,8 @@ Correspondence correspondThroughGenericHead(const rig::Rig& source, const rig::R
     const rig::SurfaceHit generic = on_generic.find(p, normal, kLeastCosine, target_reach);
     if (generic.triangle < 0 || on_generic.onBoundary(generic)) return std::nullopt;
     const auto& t = on_generic.triangle(generic.triangle);
-    Eigen::Vector3d at = Eigen::Vector3d::Zero();
-    for (std::size_t i = 0; i < 3; ++i) at += generic.barycentric[i] * faces[0].positions.row(t[i]).transpose();
-    const rig::SurfaceHit hit = on_source.find(at, normalOf(faces[0].positions, t), kLeastCosine, source_reach);
+    const rig::SurfaceHit hit =
+        on_source.find(at(faces[0].positions, {t, generic.barycentric}), normalOf(faces[0].positions, t), kLeastCosine, source_reach);
     if (hit.triangle < 0) return std::nullopt;
     return hit;
   };
@@ -186,8 +154,7 @@ std::vector<bool> enclosedByCorrespondence(const rig::Mesh& mesh, const Correspo
   const std::size_t vertices = mesh.vertexCount();
   std::vector<bool> corresponds(vertices, false);
   for (std::size_t v = 0; v < vertices; ++v) {
-    const auto& w = correspondence.source_point[v].weight;
-    corresponds[same_as[v]] = corresponds[same_as[v]] || w[0] != 0 || w[1] != 0 || w[2] != 0;
+    corresponds[same_as[v]] = corresponds[same_as[v]] || !isNone(correspondence.source_point[v]);
   }
   // Connected patches of what does not correspond, over edges of the welded mesh.
   std::vector<std::uint32_t> patch(vertices);
@@ -231,9 +198,9 @@ std::vector<SlitPair> slitPairs(const rig::Rig& source, const rig::Rig& target) 
     for (const rig::SlitContact& s : source.contacts.slits) {
       if (s.place != t.place) continue;
       for (std::size_t k = 1; k + 1 < kPairColumns; ++k) {
-        const double at = static_cast<double>(k) / (kPairColumns - 1);
+        const double along = static_cast<double>(k) / (kPairColumns - 1);
         const auto of = [&](const rig::SlitContact& slit) {
-          return static_cast<std::size_t>(std::lround(at * static_cast<double>(slit.upper.size() - 1)));
+          return static_cast<std::size_t>(std::lround(along * static_cast<double>(slit.upper.size() - 1)));
         };
         SlitPair pair;
         const std::size_t tk = of(t), sk = of(s);
@@ -243,9 +210,9 @@ std::vector<SlitPair> slitPairs(const rig::Rig& source, const rig::Rig& target) 
         pair.source_lower = pointOf(s.lower[sk]);
         // An open slit closes when the source's does. Where one of the two is closed at rest there is no such ratio.
         const double target_gap =
-            (sampleOf(target, t.upper[tk]) - sampleOf(target, t.lower[tk])).norm() / target.fapu.fapu.eye_separation;
+            (at(target.neutral.positions, t.upper[tk]) - at(target.neutral.positions, t.lower[tk])).norm() / target.fapu.fapu.eye_separation;
         const double source_gap =
-            (sampleOf(source, s.upper[sk]) - sampleOf(source, s.lower[sk])).norm() / source.fapu.fapu.eye_separation;
+            (at(source.neutral.positions, s.upper[sk]) - at(source.neutral.positions, s.lower[sk])).norm() / source.fapu.fapu.eye_separation;
         const bool open = target_gap > 0.02 && source_gap > 0.02;
         pair.gap_scale = size * (open ? target_gap / source_gap : 1.0);
         pairs.push_back(pair);

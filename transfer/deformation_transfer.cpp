@@ -31,14 +31,6 @@ Eigen::Matrix3d frameOf(const rig::VertexPositions& positions, const Triangle& t
   return frame;
 }
 
-Eigen::Vector3d at(const rig::VertexPositions& positions, const SurfacePoint& p) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (int i = 0; i < 3; ++i) sum += p.weight[i] * positions.row(p.vertex[i]).transpose();
-  return sum;
-}
-
-bool isNone(const SurfacePoint& p) { return p.weight[0] == 0 && p.weight[1] == 0 && p.weight[2] == 0; }
-
 // A triangle of the target.
 struct TargetTriangle {
   Triangle vertex;                // welded

@@ -16,14 +16,9 @@
 #include <vector>
 
 #include "rig/mesh.h"
+#include "transfer/surface.h"
 
 namespace volto::transfer {
-
-// A place on a mesh: barycentric in a triangle of its vertices.
-struct SurfacePoint {
-  std::array<std::uint32_t, 3> vertex{};
-  std::array<double, 3> weight{};  // sum 1
-};
 
 // What of the source stands for what of the target.
 struct Correspondence {

@@ -6,18 +6,12 @@
 
 #include <Eigen/Geometry>
 
+#include "rig/pose.h"
+
 namespace volto::transfer {
 namespace {
 
 constexpr double kAreaFactor = 3;
-
-std::vector<std::array<float, 3>> toFloat(const rig::VertexPositions& p) {
-  std::vector<std::array<float, 3>> out(static_cast<std::size_t>(p.rows()));
-  for (std::size_t v = 0; v < out.size(); ++v)
-    for (std::size_t k = 0; k < 3; ++k)
-      out[v][k] = static_cast<float>(p(static_cast<Eigen::Index>(v), static_cast<Eigen::Index>(k)));
-  return out;
-}
 
 class Sum {
  public:
@@ -94,8 +88,8 @@ Evaluation evaluate(const rig::Mesh& neutral, const rig::VertexPositions& truth_
         ++expression.area_distorted;
     }
     if (scope.contacts != nullptr) {
-      expression.result_passes = rig::measurePenetration(*scope.contacts, toFloat(results[i]));
-      expression.expected_passes = rig::measurePenetration(*scope.contacts, toFloat(expected));
+      expression.result_passes = rig::measurePenetration(*scope.contacts, rig::inSinglePrecision(results[i]));
+      expression.expected_passes = rig::measurePenetration(*scope.contacts, rig::inSinglePrecision(expected));
     }
     if (expression.whole.relative) {
       relative_sum += *expression.whole.relative;

@@ -1,8 +1,6 @@
 #include "transfer/expression_transfer.h"
 
 #include <algorithm>
-#include <chrono>
-#include <cmath>
 #include <optional>
 #include <stdexcept>
 
@@ -10,26 +8,20 @@
 
 #include "rig/contacts.h"
 #include "rig/parallel.h"
+#include "rig/pose.h"
 #include "rig/weld.h"
 #include "transfer/closing.h"
 #include "transfer/correspondence.h"
 #include "transfer/lining.h"
 #include "transfer/mask_transfer.h"
 #include "transfer/part_transfer.h"
+#include "transfer/surface.h"
 
 namespace volto::transfer {
 namespace {
 
 using Triangle = std::array<std::uint32_t, 3>;
 using Float3 = std::array<float, 3>;
-
-std::vector<Float3> toFloat(const rig::VertexPositions& p) {
-  std::vector<Float3> out(static_cast<std::size_t>(p.rows()));
-  for (std::size_t v = 0; v < out.size(); ++v)
-    for (std::size_t k = 0; k < 3; ++k)
-      out[v][k] = static_cast<float>(p(static_cast<Eigen::Index>(v), static_cast<Eigen::Index>(k)));
-  return out;
-}
 
 rig::VertexPositions difference(const std::vector<Float3>& before, const std::vector<Float3>& after) {
   rig::VertexPositions moved(static_cast<Eigen::Index>(before.size()), 3);
@@ -43,35 +35,10 @@ rig::VertexPositions difference(const std::vector<Float3>& before, const std::ve
 // What resolveContacts moves, in double precision.
 rig::VertexPositions outOfContact(const rig::Contacts& contacts, const std::vector<Float3>& neutral,
                                   const rig::VertexPositions& positions) {
-  const std::vector<Float3> before = toFloat(positions);
+  const std::vector<Float3> before = rig::inSinglePrecision(positions);
   std::vector<Float3> after = before;
   rig::resolveContacts(contacts, neutral, after);
   return difference(before, after);
-}
-
-bool isNone(const SurfacePoint& p) { return p.weight[0] == 0 && p.weight[1] == 0 && p.weight[2] == 0; }
-
-// Per vertex of the target: FAPU ratio along the head's axes, as the mask's points that move the vertex have it.
-std::vector<Eigen::Vector3d> ratioOfVertices(const rig::Rig& source, const rig::Rig& target) {
-  const rig::RefinedMask mask = drivingMask(target);
-  const std::vector<MaskPlace> places = placesOf(mask);
-  std::vector<Eigen::Vector3d> at_point;
-  for (const MaskPlace& place : places) at_point.push_back(fapuRatio(source, target, place));
-  const double size = target.fapu.fapu.eye_separation / source.fapu.fapu.eye_separation;
-  std::vector<Eigen::Vector3d> out(target.neutral.vertexCount(), Eigen::Vector3d::Constant(size));
-  for (std::size_t v = 0; v < out.size(); ++v) {
-    const auto points = mask.to_vertices.points(v);
-    const auto weights = mask.to_vertices.weights(v);
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    double total = 0;
-    for (std::size_t e = 0; e < points.size(); ++e) {
-      const double w = std::abs(static_cast<double>(weights[e]));
-      sum += w * at_point[points[e]];
-      total += w;
-    }
-    if (total > 0) out[v] = sum / total;
-  }
-  return out;
 }
 
 std::vector<std::uint32_t> weldOf(const rig::Rig& rig) {
@@ -80,12 +47,8 @@ std::vector<std::uint32_t> weldOf(const rig::Rig& rig) {
   for (const rig::SlitContact& contact : rig.contacts.slits) {
     rig::Slit slit;
     for (std::size_t k = 0; k < contact.upper.size(); ++k) {
-      const auto at = [&](const rig::SlitContact::Sample& s) -> Eigen::Vector3d {
-        return (1 - s.share_of_second) * rig.neutral.positions.row(s.first) +
-               s.share_of_second * rig.neutral.positions.row(s.second);
-      };
-      slit.upper.push_back(at(contact.upper[k]));
-      slit.lower.push_back(at(contact.lower[k]));
+      slit.upper.push_back(at(rig.neutral.positions, contact.upper[k]));
+      slit.lower.push_back(at(rig.neutral.positions, contact.lower[k]));
     }
     slits.push_back(std::move(slit));
   }
@@ -106,15 +69,14 @@ struct ExpressionTransfer::State {
   Eigen::Matrix3d source_from_target = Eigen::Matrix3d::Identity();
   std::vector<Float3> source_neutral, target_neutral;
   std::size_t corresponding = 0;
-  double seconds = 0;
 
   State(const rig::Rig& s, const rig::Rig& t)
       : source(s),
         target(t),
-        same(transfer::sameMesh(s.neutral, t.neutral)),
+        same(rig::sameTopology(s.neutral, t.neutral)),
         mask(s, t),
-        source_neutral(toFloat(s.neutral.positions)),
-        target_neutral(toFloat(t.neutral.positions)) {
+        source_neutral(rig::neutralPositions(s)),
+        target_neutral(rig::neutralPositions(t)) {
     contacts = t.contacts;
     if (same) return;
     parts.emplace(s, t);
@@ -132,13 +94,9 @@ struct ExpressionTransfer::State {
 
   // Every triangle of the target's skin, to be brought back when it turns over: what other shapes than its own may do.
   void guardSkin(std::span<const std::uint32_t> weld) {
-    std::vector<bool> part(target_neutral.size(), false);
-    for (const rig::RigidPart& p : target.rigid_parts)
-      for (const std::uint32_t v : p.vertices) part[v] = true;
     contacts.folds = {};
     const double least = 1e-9 * target.fapu.fapu.eye_separation * target.fapu.fapu.eye_separation;
-    for (const Triangle& t : rig::triangulate(target.neutral)) {
-      if (part[t[0]]) continue;
+    for (const Triangle& t : skinTriangles(target).triangles) {
       const Triangle welded = {weld[t[0]], weld[t[1]], weld[t[2]]};
       const Eigen::Vector3d a = target.neutral.positions.row(welded[0]), b = target.neutral.positions.row(welded[1]),
                             d = target.neutral.positions.row(welded[2]);
@@ -161,9 +119,9 @@ struct ExpressionTransfer::State {
     // What unfolds may open again by a little.
     constexpr int kTimes = 3;
     for (int time = 0; !same && time < kTimes; ++time) {
-      const std::vector<Float3> before = toFloat(result);
+      const std::vector<Float3> before = rig::inSinglePrecision(result);
       std::vector<Float3> closed = before;
-      closeAsSource(source, source_neutral, toFloat(example), target, target_neutral, closed);
+      closeAsSource(source, source_neutral, rig::inSinglePrecision(example), target, target_neutral, closed);
       result += difference(before, closed);
       if (time + 1 < kTimes) result += outOfContact(contacts, target_neutral, result);
     }
@@ -184,7 +142,7 @@ struct ExpressionTransfer::State {
     Correspondence c = same ? sameTopology(target.neutral) : correspondThroughGenericHead(source, target);
     c.target_from_head = target.mesh_from_head;
     c.target_from_source = target.mesh_from_head * source.mesh_from_head.transpose();
-    c.displacement_scale = ratioOfVertices(source, target);
+    c.displacement_scale = mask.vertexRatios();
     source_from_target = c.target_from_source.transpose();
     std::vector<Triangle> all_triangles = source_triangles;
     rig::VertexPositions all_positions = source.neutral.positions;
@@ -223,10 +181,8 @@ struct ExpressionTransfer::State {
 
 ExpressionTransfer::ExpressionTransfer(const rig::Rig& source, const rig::Rig& target,
                                        const ExpressionTransferOptions& options) {
-  const auto start = std::chrono::steady_clock::now();
   state_ = std::make_unique<State>(source, target);
   if (options.method == Method::deformation) state_->prepareDeformation(options.threads);
-  state_->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 ExpressionTransfer::~ExpressionTransfer() = default;
@@ -256,6 +212,5 @@ std::vector<rig::VertexPositions> ExpressionTransfer::transfer(std::span<const r
 bool ExpressionTransfer::sameMesh() const { return state_->same; }
 std::size_t ExpressionTransfer::maskPoints() const { return state_->mask.targetPointCount(); }
 std::size_t ExpressionTransfer::correspondingVertices() const { return state_->corresponding; }
-double ExpressionTransfer::secondsToPrepare() const { return state_->seconds; }
 
 }  // namespace volto::transfer

@@ -44,7 +44,6 @@ class ExpressionTransfer {
   bool sameMesh() const;
   std::size_t maskPoints() const;             // of the target
   std::size_t correspondingVertices() const;  // of the target; method deformation alone
-  double secondsToPrepare() const;
 
  private:
   struct State;

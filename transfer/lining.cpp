@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 
 #include "rig/closest_point.h"
+#include "transfer/surface.h"
 
 namespace volto::transfer {
 namespace {
@@ -14,13 +15,6 @@ constexpr double kDeepestEs = 0.2;
 constexpr double kLeastForward = 0.2;  // cosine between the skin's normal and the face's direction
 constexpr double kLeastReachEs = 0.02;
 constexpr double kNearest = 0.5;  // of the depth at rest
-
-Eigen::Vector3d normalOf(const rig::VertexPositions& p, const std::array<std::uint32_t, 3>& t) {
-  const Eigen::Vector3d a = p.row(t[0]), b = p.row(t[1]), c = p.row(t[2]);
-  const Eigen::Vector3d n = (b - a).cross(c - a);
-  const double length = n.norm();
-  return length > 0 ? Eigen::Vector3d(n / length) : Eigen::Vector3d::Zero();
-}
 
 }  // namespace
 
@@ -40,9 +34,7 @@ Lining::Lining(const rig::Rig& rig, const std::vector<bool>& inside, std::vector
     const double facing = normal.dot(forward);
     if (std::abs(facing) < kLeastForward) continue;
     lining.side = facing > 0 ? 1 : -1;
-    Eigen::Vector3d place = Eigen::Vector3d::Zero();
-    for (std::size_t i = 0; i < 3; ++i) place += lining.weight[i] * neutral.row(lining.skin[i]).transpose();
-    lining.depth = -lining.side * normal.dot(here - place);
+    lining.depth = -lining.side * normal.dot(here - at(neutral, {lining.skin, lining.weight}));
     lining.reach = std::max(lining.depth, kLeastReachEs * rig.fapu.fapu.eye_separation);
     if (lining.depth > 0.5 * on.distance && lining.depth > 0) vertices_.push_back(lining);
   }
@@ -50,10 +42,8 @@ Lining::Lining(const rig::Rig& rig, const std::vector<bool>& inside, std::vector
 
 void Lining::keepBehind(rig::VertexPositions& positions) const {
   for (const Vertex& l : vertices_) {
-    Eigen::Vector3d place = Eigen::Vector3d::Zero();
-    for (std::size_t i = 0; i < 3; ++i) place += l.weight[i] * positions.row(l.skin[i]).transpose();
     const Eigen::Vector3d outwards = l.side * normalOf(positions, l.skin);
-    const Eigen::Vector3d off = positions.row(l.vertex).transpose() - place;
+    const Eigen::Vector3d off = positions.row(l.vertex).transpose() - at(positions, {l.skin, l.weight});
     const double depth = -outwards.dot(off);
     if (depth >= kNearest * l.depth) continue;
     // Only what is still behind it: the inside of an upper lip lies behind the lower one until the jaw opens.

@@ -1,5 +1,7 @@
 #include "transfer/mask_transfer.h"
 
+#include <cmath>
+
 #include "rig/closest_point.h"
 #include "rig/fapu.h"
 
@@ -27,16 +29,10 @@ Eigen::Vector3d fapuRatio(const rig::Rig& source, const rig::Rig& target, const 
   return scaleAt(target, place).cwiseQuotient(scaleAt(source, place));
 }
 
-bool sameMesh(const rig::Mesh& a, const rig::Mesh& b) {
-  return a.vertexCount() == b.vertexCount() && a.polygon_start == b.polygon_start &&
-         a.corner_vertices == b.corner_vertices;
-}
-
 MaskTransfer::MaskTransfer(const rig::Rig& source, const rig::Rig& target)
     : source_(source), target_(target), mask_(drivingMask(target)) {
   const rig::RefinedMask on_source = drivingMask(source);
-  source_points_ = on_source.pointCount();
-  const bool same = sameMesh(source.neutral, target.neutral);
+  const bool same = rig::sameTopology(source.neutral, target.neutral);
   const MaskInterpolation reading(on_source);
   const std::vector<MaskPlace> places = placesOf(mask_);
   readings_.resize(mask_.pointCount());
@@ -51,8 +47,8 @@ MaskTransfer::MaskTransfer(const rig::Rig& source, const rig::Rig& target)
       for (std::size_t i = 0; i < 3; ++i) r.vertex[i] = vertexOf(on_source, row.point[i], source.neutral.positions);
       r.weight = row.weight;
     }
-    r.target_from_source =
-        target.mesh_from_head * fapuRatio(source, target, places[p]).asDiagonal() * source.mesh_from_head.transpose();
+    r.ratio = fapuRatio(source, target, places[p]);
+    r.target_from_source = target.mesh_from_head * r.ratio.asDiagonal() * source.mesh_from_head.transpose();
   }
 }
 
@@ -66,6 +62,24 @@ rig::VertexPositions MaskTransfer::pointDisplacements(const rig::VertexPositions
     points.row(static_cast<Eigen::Index>(p)) = (r.target_from_source * moved).transpose();
   }
   return points;
+}
+
+std::vector<Eigen::Vector3d> MaskTransfer::vertexRatios() const {
+  const double size = target_.fapu.fapu.eye_separation / source_.fapu.fapu.eye_separation;
+  std::vector<Eigen::Vector3d> out(target_.neutral.vertexCount(), Eigen::Vector3d::Constant(size));
+  for (std::size_t v = 0; v < out.size(); ++v) {
+    const auto points = mask_.to_vertices.points(v);
+    const auto weights = mask_.to_vertices.weights(v);
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    double total = 0;
+    for (std::size_t e = 0; e < points.size(); ++e) {
+      const double w = std::abs(static_cast<double>(weights[e]));
+      sum += w * readings_[points[e]].ratio;
+      total += w;
+    }
+    if (total > 0) out[v] = sum / total;
+  }
+  return out;
 }
 
 rig::VertexPositions MaskTransfer::transfer(const rig::VertexPositions& example) const {

@@ -13,9 +13,6 @@ namespace volto::transfer {
 // How much longer a displacement is on the target than on the source at a place of the mask, along the head's axes.
 Eigen::Vector3d fapuRatio(const rig::Rig& source, const rig::Rig& target, const MaskPlace& place);
 
-// Whether both are the same mesh, vertex by vertex and polygon by polygon, with vertices moved.
-bool sameMesh(const rig::Mesh& a, const rig::Mesh& b);
-
 // Const calls from several threads are fine. Borrows `source` and `target`.
 class MaskTransfer {
  public:
@@ -24,11 +21,14 @@ class MaskTransfer {
   // the very vertices.
   MaskTransfer(const rig::Rig& source, const rig::Rig& target);
 
-  std::size_t sourcePointCount() const { return source_points_; }
   std::size_t targetPointCount() const { return mask_.pointCount(); }
 
   // #M by 3: how the points of the target's mask move, its frame and unit.
   rig::VertexPositions pointDisplacements(const rig::VertexPositions& example) const;
+
+  // One per vertex of the target: how much longer a displacement is on it, along the head's axes, as the points that
+  // move it have it; the ratio of the eye separations where none does.
+  std::vector<Eigen::Vector3d> vertexRatios() const;
 
   // `example`: #V by 3 of the source. Result: #V by 3 of the target, its frame and unit; contacts are not looked at.
   rig::VertexPositions transfer(const rig::VertexPositions& example) const;
@@ -37,10 +37,10 @@ class MaskTransfer {
   const rig::Rig& source_;
   const rig::Rig& target_;
   rig::RefinedMask mask_;  // of the target
-  std::size_t source_points_ = 0;
   struct Reading {
     std::array<std::uint32_t, 3> vertex{};  // of the source
     std::array<double, 3> weight{};
+    Eigen::Vector3d ratio = Eigen::Vector3d::Ones();                   // of FAPU, along the head's axes
     Eigen::Matrix3d target_from_source = Eigen::Matrix3d::Identity();  // turn and FAPU
   };
   std::vector<Reading> readings_;  // one per point of the target's mask

@@ -1,9 +1,7 @@
 #include "transfer/mesh_set.h"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
-#include <cctype>
 #include <exception>
 #include <system_error>
 #include <thread>
@@ -11,21 +9,10 @@
 #include "rig/mesh_io.h"
 
 namespace volto::transfer {
-namespace {
-
-bool isMeshFile(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
-  constexpr std::array<std::string_view, 6> kEndings = {".obj", ".ply", ".off", ".stl", ".glb", ".gltf"};
-  return std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
-}
-
-}  // namespace
-
 MeshSet readMeshSet(const std::filesystem::path& folder, const rig::Mesh& neutral, int threads) {
   MeshSet set;
   for (const std::filesystem::directory_entry& entry : std::filesystem::directory_iterator(folder))
-    if (isMeshFile(entry.path()) && !entry.is_directory()) set.files.push_back(entry.path());
+    if (rig::isMeshFileName(entry.path()) && !entry.is_directory()) set.files.push_back(entry.path());
   if (set.files.empty())
     throw rig::InputError(folder.string() + ": no meshes in this folder; it must hold one mesh file per expression");
   std::sort(set.files.begin(), set.files.end());

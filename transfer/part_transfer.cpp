@@ -7,6 +7,7 @@
 
 #include "rig/closest_point.h"
 #include "rig/rigid_motion.h"
+#include "transfer/surface.h"
 
 namespace volto::transfer {
 namespace {
@@ -23,11 +24,6 @@ Eigen::Matrix3d frameOf(const rig::VertexPositions& p, const std::array<std::uin
   frame.col(2) = normal.normalized();
   frame.col(1) = frame.col(2).cross(frame.col(0));
   return frame;
-}
-
-Eigen::Vector3d at(const rig::VertexPositions& p, const std::array<std::uint32_t, 3>& t,
-                   const std::array<double, 3>& w) {
-  return w[0] * p.row(t[0]).transpose() + w[1] * p.row(t[1]).transpose() + w[2] * p.row(t[2]).transpose();
 }
 
 }  // namespace
@@ -80,13 +76,7 @@ PartTransfer::PartTransfer(const rig::Rig& source, const rig::Rig& target) : sou
     }
     if (t.source.size() >= 3 && !t.target.empty()) turning_.push_back(std::move(t));
   }
-  std::vector<bool> part(target.neutral.vertexCount(), false);
-  for (const rig::RigidPart& p : target.rigid_parts)
-    for (const std::uint32_t v : p.vertices) part[v] = true;
-  std::vector<std::array<std::uint32_t, 3>> skin;
-  for (const auto& t : rig::triangulate(target.neutral))
-    if (!part[t[0]]) skin.push_back(t);
-  const rig::ClosestPoint nearest(target.neutral.positions, std::move(skin));
+  const rig::ClosestPoint nearest(target.neutral.positions, skinTriangles(target).triangles);
   if (nearest.empty()) return;
   // Lashes ride on their lid, as contacts have it (rig/contacts.h).
   std::vector<bool> on_lid(target.neutral.vertexCount(), false);
@@ -98,9 +88,9 @@ PartTransfer::PartTransfer(const rig::Rig& source, const rig::Rig& target) : sou
       const Eigen::Vector3d here = target.neutral.positions.row(v);
       const rig::SurfacePoint on = nearest.find(here);
       if (on.triangle < 0) continue;
-      Rider rider{v, nearest.triangle(on.triangle), on.barycentric, {}};
-      rider.offset = frameOf(target.neutral.positions, rider.on).transpose() *
-                     (here - at(target.neutral.positions, rider.on, rider.weight));
+      Rider rider{v, {nearest.triangle(on.triangle), on.barycentric}, {}};
+      rider.offset = frameOf(target.neutral.positions, rider.on.vertex).transpose() *
+                     (here - at(target.neutral.positions, rider.on));
       riders_.push_back(rider);
     }
   }
@@ -123,7 +113,7 @@ void PartTransfer::apply(const rig::VertexPositions& example, rig::VertexPositio
     }
   }
   for (const Rider& r : riders_)
-    result.row(r.vertex) = (at(result, r.on, r.weight) + frameOf(result, r.on) * r.offset).transpose();
+    result.row(r.vertex) = (at(result, r.on) + frameOf(result, r.on.vertex) * r.offset).transpose();
 }
 
 }  // namespace volto::transfer

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "rig/rig.h"
+#include "transfer/surface.h"
 
 namespace volto::transfer {
 
@@ -26,8 +27,7 @@ class PartTransfer {
   // A vertex in the frame of a triangle of skin.
   struct Rider {
     std::uint32_t vertex = 0;
-    std::array<std::uint32_t, 3> on{};
-    std::array<double, 3> weight{};
+    SurfacePoint on;
     Eigen::Vector3d offset;  // in the triangle's frame
   };
   const rig::Rig& source_;

@@ -96,7 +96,7 @@ TEST(MaskTransfer, TurnedAndEnlargedHeadDoesTheSameTurnedAndEnlarged) {
 // The same surface with other triangles, subdivided otherwise: vertices that are in both meshes go to the same place.
 TEST(MaskTransfer, MeshesAndMasksOfAnotherFinenessAgree) {
   const rig::Rig fine = rigOf(test::makeTestHead({.subdivisions = 4}), 2), coarse = rigOf(test::makeTestHead({.subdivisions = 3}), 1);
-  EXPECT_FALSE(sameMesh(fine.neutral, coarse.neutral));
+  EXPECT_FALSE(rig::sameTopology(fine.neutral, coarse.neutral));
   const rig::VertexPositions example = moved(fine.neutral.positions, 0.05);
   const rig::VertexPositions there = MaskTransfer(fine, coarse).transfer(example);
   const rig::VertexPositions wanted = moved(coarse.neutral.positions, 0.05);
