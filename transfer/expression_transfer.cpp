@@ -10,6 +10,7 @@
 #include "rig/parallel.h"
 #include "rig/pose.h"
 #include "rig/weld.h"
+#include "transfer/added_examples.h"
 #include "transfer/closing.h"
 #include "transfer/correspondence.h"
 #include "transfer/lining.h"
@@ -125,8 +126,9 @@ struct ExpressionTransfer::State {
       result += difference(before, closed);
       if (time + 1 < kTimes) result += outOfContact(contacts, target_neutral, result);
     }
+    if (!same) return settle(result);
     rig::VertexPositions moved = outOfContact(contacts, target_neutral, result);
-    if (same && !source.contacts.empty()) {
+    if (!source.contacts.empty()) {
       const rig::VertexPositions allowed = outOfContact(source.contacts, source_neutral, example);
       const double size = target.fapu.fapu.eye_separation / source.fapu.fapu.eye_separation;
       for (Eigen::Index v = 0; v < moved.rows(); ++v) {
@@ -135,6 +137,19 @@ struct ExpressionTransfer::State {
       }
     }
     result += moved;
+  }
+
+  // Out of contact for good: what unfolds pushes its neighbours, and lining that is put behind the skin may fold. A live
+  // face has 24 rounds for that (rig/contacts.cpp), a transfer as many as it takes.
+  void settle(rig::VertexPositions& result) const {
+    constexpr int kMost = 12;
+    constexpr double kStillEs = 1e-5;
+    for (int time = 0; time < kMost; ++time) {
+      const rig::VertexPositions before = result;
+      if (lining && time + 1 < kMost) lining->keepBehind(result);
+      result += outOfContact(contacts, target_neutral, result);
+      if ((result - before).cwiseAbs().maxCoeff() < kStillEs * target.fapu.fapu.eye_separation) return;
+    }
   }
 
   void prepareDeformation(int threads) {
@@ -192,6 +207,17 @@ std::vector<rig::VertexPositions> ExpressionTransfer::transfer(std::span<const r
   for (const rig::VertexPositions& example : examples)
     if (example.rows() != s.source.neutral.positions.rows())
       throw std::invalid_argument("ExpressionTransfer: an example with another number of vertices than the source");
+  // What is made to be added to another example is carried with it, since lips that pass each other have no meaning.
+  const std::vector<std::int32_t> added =
+      addedTo(s.source.contacts, s.source.fapu.fapu.eye_separation, s.source.neutral.positions, examples);
+  std::vector<rig::VertexPositions> sums;
+  if (std::any_of(added.begin(), added.end(), [](std::int32_t to) { return to >= 0; })) {
+    sums.assign(examples.begin(), examples.end());
+    for (std::size_t i = 0; i < sums.size(); ++i)
+      if (added[i] >= 0)
+        sums[i] = together(s.source.neutral.positions, examples[i], examples[static_cast<std::size_t>(added[i])]);
+    examples = sums;
+  }
   std::vector<rig::VertexPositions> results(examples.size());
   const bool by_mask = !s.deformation || !s.same;
   if (by_mask) rig::parallelFor(examples.size(), [&](std::size_t i) { results[i] = s.mask.transfer(examples[i]); });
@@ -203,9 +229,11 @@ std::vector<rig::VertexPositions> ExpressionTransfer::transfer(std::span<const r
   }
   rig::parallelFor(examples.size(), [&](std::size_t i) {
     s.resolve(examples[i], results[i]);
-    if (s.lining) s.lining->keepBehind(results[i]);
     if (s.parts) s.parts->apply(examples[i], results[i]);
   });
+  // None is added to one that is itself added to another (transfer/added_examples.h): the order does not matter.
+  for (std::size_t i = 0; i < results.size(); ++i)
+    if (added[i] >= 0) results[i] += s.target.neutral.positions - results[static_cast<std::size_t>(added[i])];
   return results;
 }
 

@@ -36,7 +36,8 @@ class ExpressionTransfer {
   ExpressionTransfer& operator=(const ExpressionTransfer&) = delete;
 
   // One per example, #V by 3 of the target, its order, frame and unit. `examples`: #V by 3 of the source. An example
-  // equal to the source's neutral gives the target's, to rounding. The same bits whatever the number of threads. Throws
+  // equal to the source's neutral gives the target's, to rounding. One that is made to be added to another of them
+  // (transfer/added_examples.h) is carried with it and comes back as the difference. The same bits whatever the number of threads. Throws
   // std::invalid_argument for an example of another size.
   std::vector<rig::VertexPositions> transfer(std::span<const rig::VertexPositions> examples) const;
 

@@ -1,6 +1,7 @@
 #include "transfer/part_transfer.h"
 
 #include <algorithm>
+#include <map>
 #include <string>
 
 #include <Eigen/Geometry>
@@ -78,13 +79,25 @@ PartTransfer::PartTransfer(const rig::Rig& source, const rig::Rig& target) : sou
   }
   const rig::ClosestPoint nearest(target.neutral.positions, skinTriangles(target).triangles);
   if (nearest.empty()) return;
-  // Lashes ride on their lid, as contacts have it (rig/contacts.h).
-  std::vector<bool> on_lid(target.neutral.vertexCount(), false);
-  for (const rig::Rider& rider : target.contacts.riders) on_lid[rider.vertex] = true;
+  // Lashes grow on the margin of their eye: where the contacts tie them to an eyeball.
+  std::vector<std::int32_t> ball_of(target.neutral.vertexCount(), -1);
+  for (const rig::Rider& rider : target.contacts.riders) ball_of[rider.vertex] = rider.ball;
+  std::vector<std::int32_t> ring_of_ball(target.contacts.balls.size(), -1);
+  for (const rig::SlitContact& slit : target.contacts.slits) {
+    if (slit.ball < 0) continue;
+    ring_of_ball[static_cast<std::size_t>(slit.ball)] = static_cast<std::int32_t>(rings_.size());
+    rings_.emplace_back(target, slit);
+  }
+  const std::vector<std::uint32_t> piece = rig::connectedComponents(target.neutral);
   for (const rig::RigidPart& p : target.rigid_parts) {
     if (p.follows != Follows::skin) continue;
+    // Piece by piece: lashes of both lids and the tear film are often one part.
+    std::vector<std::map<std::uint32_t, std::vector<std::uint32_t>>> on_ring(rings_.size());
     for (const std::uint32_t v : p.vertices) {
-      if (on_lid[v]) continue;
+      if (const std::int32_t ball = ball_of[v]; ball >= 0 && ring_of_ball[static_cast<std::size_t>(ball)] >= 0) {
+        on_ring[static_cast<std::size_t>(ring_of_ball[static_cast<std::size_t>(ball)])][piece[v]].push_back(v);
+        continue;
+      }
       const Eigen::Vector3d here = target.neutral.positions.row(v);
       const rig::SurfacePoint on = nearest.find(here);
       if (on.triangle < 0) continue;
@@ -93,6 +106,8 @@ PartTransfer::PartTransfer(const rig::Rig& source, const rig::Rig& target) : sou
                      (here - at(target.neutral.positions, rider.on));
       riders_.push_back(rider);
     }
+    for (std::size_t r = 0; r < rings_.size(); ++r)
+      for (const auto& [of, vertices] : on_ring[r]) rings_[r].add(vertices);
   }
 }
 
@@ -112,6 +127,7 @@ void PartTransfer::apply(const rig::VertexPositions& example, rig::VertexPositio
       result.row(t.target[i]) = (rest + t.share[i] * (moved - rest)).transpose();
     }
   }
+  for (const LidRing& ring : rings_) ring.apply(result);
   for (const Rider& r : riders_)
     result.row(r.vertex) = (at(result, r.on) + frameOf(result, r.on.vertex) * r.offset).transpose();
 }

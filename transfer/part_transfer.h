@@ -1,10 +1,11 @@
 // What does not deform as skin does, on a target whose parts are not the source's: eyeballs, lower teeth and tongue
-// turn and shift as the source's do; lashes and brows ride on the skin under them.
+// turn and shift as the source's do; lashes go with the margin of their eye, brows ride on the skin under them.
 #pragma once
 
 #include <vector>
 
 #include "rig/rig.h"
+#include "transfer/lid_ring.h"
 #include "transfer/surface.h"
 
 namespace volto::transfer {
@@ -33,6 +34,7 @@ class PartTransfer {
   const rig::Rig& source_;
   const rig::Rig& target_;
   std::vector<Turning> turning_;
+  std::vector<LidRing> rings_;  // one per eye
   std::vector<Rider> riders_;
 };
 

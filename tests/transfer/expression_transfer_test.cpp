@@ -8,10 +8,13 @@
 #include "rig/build_rig.h"
 #include "rig/contacts.h"
 #include "rig/mesh_io.h"
+#include "rig/pose.h"
 #include "tests/rig/test_head.h"
 #include "tests/support/test_data.h"
+#include "transfer/added_examples.h"
 #include "transfer/evaluation.h"
 #include "transfer/mesh_set.h"
+#include "transfer/surface.h"
 
 namespace volto::transfer {
 namespace {
@@ -74,11 +77,12 @@ TEST(ExpressionTransfer, EyesCloseOnAHeadOfAnotherTopology) {
   const rig::Rig source = annotated(ict / "neutral.obj", "ict_feature_points.json");
   const rig::Rig target =
       annotated(data / "meshes/makehuman/caucasian-female-young/neutral.obj", "makehuman_feature_points.json");
-  const rig::VertexPositions blink = rig::readMesh(ict / "expressions/eyeBlink_L.obj").positions;
+  const auto example = [&](const char* name) { return rig::readMesh(ict / "expressions" / name).positions; };
   const ExpressionTransfer transfer(source, target, {});
   EXPECT_FALSE(transfer.sameMesh());
   EXPECT_GT(transfer.correspondingVertices(), 1000U);
-  const auto result = transfer.transfer(std::vector{blink, source.neutral.positions});
+  const auto result = transfer.transfer(std::vector{example("eyeBlink_L.obj"), source.neutral.positions,
+                                                    example("mouthClose.obj"), example("jawOpen.obj")});
   const double es = target.fapu.fapu.eye_separation;
   EXPECT_LT((result[1] - target.neutral.positions).rowwise().norm().maxCoeff(), 1e-6 * es);
   const auto gap = [&](std::string_view upper, std::string_view lower, const rig::VertexPositions& at) {
@@ -102,6 +106,17 @@ TEST(ExpressionTransfer, EyesCloseOnAHeadOfAnotherTopology) {
   };
   EXPECT_LT(widest(rig::SlitContact::Place::left_eye, result[0]), 0.02);
   EXPECT_GT(widest(rig::SlitContact::Place::right_eye, result[0]), 0.12);
+
+  // mouthClose is made for an open jaw (the source's own has 597 triangles of the skin inside out, by itself).
+  const rig::VertexPositions shut = together(target.neutral.positions, result[2], result[3]);
+  EXPECT_GT(widest(rig::SlitContact::Place::mouth, result[3]), 0.4);
+  EXPECT_LT(widest(rig::SlitContact::Place::mouth, shut), 0.01);
+  EXPECT_LT(rig::measurePenetration(target.contacts, rig::inSinglePrecision(shut)).lips / es, 0.002);
+  for (const auto& t : skinTriangles(target).triangles) {
+    const Eigen::Vector3d at_rest = normalOf(target.neutral.positions, t);
+    for (const rig::VertexPositions* p : {&result[0], &result[3], &shut})
+      EXPECT_GE(at_rest.dot(normalOf(*p, t)), 0) << "triangle at " << target.neutral.positions.row(t[0]);
+  }
 }
 
 // An open mouth: the upper teeth stay, the lower ones go with the chin though the artist left the tongue behind.

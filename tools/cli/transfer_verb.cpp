@@ -20,6 +20,7 @@
 #include "tools/cli/read_input.h"
 #include "tools/cli/stop_signal.h"
 #include "tools/cli/verb.h"
+#include "transfer/added_examples.h"
 #include "transfer/expression_transfer.h"
 #include "transfer/mesh_set.h"
 
@@ -137,6 +138,12 @@ int run(const Options& options) {
                 transfer.correspondingVertices(), target.neutral.vertexCount());
   std::printf("time: read %.2f s, prepare %.2f s, transfer %.2f s, write %.2f s\n", reading, preparing, computing,
               secondsSince(start));
+  const std::vector<std::int32_t> added = transfer::addedTo(source.contacts, source.fapu.fapu.eye_separation,
+                                                            source.neutral.positions, examples.positions);
+  for (std::size_t i = 0; i < added.size(); ++i)
+    if (added[i] >= 0)
+      std::printf("note: %s is made to be added to %s: by itself it turns lips or lids inside out, as on the source\n",
+                  examples.names[i].c_str(), examples.names[static_cast<std::size_t>(added[i])].c_str());
   for (const std::string& name : still)
     std::printf("note: %s does not move on the source: empty on the target too\n", name.c_str());
   return kDone;
