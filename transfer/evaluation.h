@@ -32,11 +32,22 @@ struct ExpressionEvaluation {
   std::string name;
   ErrorFigures whole;
   std::vector<ErrorFigures> regions;  // one per name in Evaluation::region_names
+  // Where this shape is made to be added to another one of the set (transfer/added_examples.h), the name of that one:
+  // what follows is counted on their sum.
+  std::string counted_with;
   // Triangles whose area changed by more than a factor 3 against what was expected, and those that are inside out
   // against the expected shape (normals more than 90 degrees apart).
   std::size_t area_distorted = 0, flipped = 0;
   // How deep lips and lids have passed each other and skin entered an eyeball, beyond rest; where contacts are known.
   std::optional<rig::Penetration> result_passes, expected_passes;
+  // Pairs of the skin's triangles that go through each other and do not at rest, one of them at least in lips or lids
+  // (EvaluationScope::intersecting); by less than 0.0005 eye separations they only touch. Nothing where lips and lids are
+  // not known.
+  struct Crossings {
+    std::size_t pairs = 0;
+    std::vector<std::size_t> regions;  // one per region: pairs with a triangle in it
+  };
+  std::optional<Crossings> result_crossings, expected_crossings;
 };
 
 struct Evaluation {
@@ -52,9 +63,12 @@ struct EvaluationScope {
   std::vector<std::string> region_names;                // empty: no regions
   std::vector<std::int16_t> region_of_vertex;           // #V: index into region_names, -1: none
   const rig::Contacts* contacts = nullptr;              // of the neutral mesh; borrowed for the call
+  double eye_separation = 0;                            // mesh unit, where contacts are given
+  std::vector<bool> intersecting;                       // one per region: lips and lids; empty: none is looked at
+  std::vector<std::array<std::uint32_t, 3>> skin;       // what they may go through
 };
 
-// One `result` and one `truth` per name. Throws std::invalid_argument when sizes differ.
+// One `result` and one `truth` per name. Several at a time, the same figures however many. Throws std::invalid_argument when sizes differ.
 Evaluation evaluate(const rig::Mesh& neutral, const rig::VertexPositions& truth_neutral,
                     std::span<const std::string> names, std::span<const rig::VertexPositions> results,
                     std::span<const rig::VertexPositions> truths, const EvaluationScope& scope = {});

@@ -83,7 +83,8 @@ TEST_F(OneExpression, AnotherPersonsTruthIsCarriedOverAsDisplacement) {
   EXPECT_LT(e.mean_relative, 1e-12);
 }
 
-TEST_F(OneExpression, LipsThatPassEachOtherAreMeasured) {
+// The sheet's slit as a mouth.
+rig::Contacts mouthOf(const Sheet& sheet) {
   rig::Contacts contacts;
   rig::SlitContact slit;
   slit.up = {0, 1, 0};
@@ -97,6 +98,11 @@ TEST_F(OneExpression, LipsThatPassEachOtherAreMeasured) {
   slit.lower.push_back({sheet.upper.back() + 1, sheet.upper.back() + 1, 0});
   slit.least_gap.push_back(0);
   contacts.slits.push_back(slit);
+  return contacts;
+}
+
+TEST_F(OneExpression, LipsThatPassEachOtherAreMeasured) {
+  const rig::Contacts contacts = mouthOf(sheet);
   EvaluationScope scope;
   EXPECT_FALSE(judge(truth).expressions[0].result_passes);
   scope.contacts = &contacts;
@@ -105,6 +111,46 @@ TEST_F(OneExpression, LipsThatPassEachOtherAreMeasured) {
   for (const std::uint32_t v : sheet.upper) crossed(v, 1) -= 0.7;  // the slit is 0.4 wide
   EXPECT_NEAR(judge(crossed, scope).expressions[0].result_passes->lips, 0.3, 1e-5);
   EXPECT_EQ(judge(crossed, scope).expressions[0].expected_passes->lips, 0);
+}
+
+// The upper half stands in front of the lower one and comes down: each of its margin's triangles goes through what is
+// there.
+TEST(Evaluation, LipsThatGoThroughEachOtherAreCountedInTheirRegions) {
+  const Sheet sheet = makeSheet(24, 8, 0.2);
+  const rig::VertexPositions& neutral = sheet.mesh.positions;
+  EvaluationScope scope;
+  const rig::Contacts contacts = mouthOf(sheet);
+  scope.contacts = &contacts;
+  scope.eye_separation = 4;
+  scope.region_names = {"upper lip", "lower lip", "rest"};
+  scope.intersecting = {true, true, false};
+  for (Eigen::Index v = 0; v < neutral.rows(); ++v)
+    scope.region_of_vertex.push_back(std::abs(neutral(v, 1) - 4) > 1.5 ? 2 : neutral(v, 1) > 4 ? 0 : 1);
+  scope.skin = rig::triangulate(sheet.mesh);
+  rig::VertexPositions through = neutral, open = neutral;
+  for (std::size_t k = 0; k < sheet.upper.size(); ++k) {
+    through(sheet.upper[k], 1) -= 1.5;
+    through(sheet.upper[k], 2) += k % 2 == 0 ? 0.3 : -0.3;
+  }
+  for (Eigen::Index v = 0; v < open.rows(); ++v)
+    if (open(v, 1) < 4) open(v, 1) -= 1.5;
+  const auto judge = [&](const std::vector<std::string>& names, const std::vector<rig::VertexPositions>& results) {
+    return evaluate(sheet.mesh, neutral, names, results,
+                    std::vector<rig::VertexPositions>(results.size(), neutral), scope);
+  };
+  const ExpressionEvaluation alone = judge({"through"}, {through}).expressions[0];
+  EXPECT_GT(alone.result_crossings->pairs, 5U);
+  EXPECT_GT(alone.result_crossings->regions[0], 5U);
+  EXPECT_EQ(alone.result_crossings->regions[0], alone.result_crossings->pairs);
+  EXPECT_GT(alone.result_crossings->regions[1], 5U);
+  EXPECT_EQ(alone.expected_crossings->pairs, 0U);
+  EXPECT_TRUE(alone.counted_with.empty());
+  // Made to be added to a shape that opens as far, it is counted on the sum.
+  const Evaluation both = judge({"open", "through"}, {open, through});
+  EXPECT_EQ(both.expressions[1].counted_with, "open");
+  EXPECT_EQ(both.expressions[1].result_crossings->pairs, 0U);
+  EXPECT_GT(both.expressions[1].whole.rms, 0);
+  EXPECT_TRUE(both.expressions[0].counted_with.empty());
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include "rig/control_mask.h"
 #include "rig/mesh_io.h"
 #include "rig/rig_file.h"
+#include "rig/slit_side.h"
 #include "tools/cli/error_picture.h"
 #include "tools/cli/exit_status.h"
 #include "tools/cli/output_file.h"
@@ -22,6 +23,7 @@
 #include "tools/picture/png.h"
 #include "transfer/evaluation.h"
 #include "transfer/mesh_set.h"
+#include "transfer/surface.h"
 
 namespace volto::cli {
 namespace {
@@ -53,6 +55,9 @@ void parseRange(const std::string& text, transfer::EvaluationScope& scope) {
 void nameRegions(const rig::Rig& rig, transfer::EvaluationScope& scope) {
   for (std::size_t r = 0; r < rig::kFaceRegionCount; ++r)
     scope.region_names.emplace_back(rig::regionName(static_cast<rig::FaceRegion>(r)));
+  for (std::size_t r = 0; r < rig::kFaceRegionCount; ++r)
+    scope.intersecting.push_back(rig::sideOf(static_cast<rig::FaceRegion>(r)) != rig::SlitSide::none);
+  scope.skin = transfer::skinTriangles(rig).triangles;
   for (const std::int16_t triangle : rig.association.triangle)
     scope.region_of_vertex.push_back(
         triangle < 0 ? std::int16_t{-1}
@@ -95,6 +100,7 @@ void printJson(const transfer::Evaluation& evaluation, const Pairs& pairs, std::
   Json expressions = Json::object();
   for (const transfer::ExpressionEvaluation& e : evaluation.expressions) {
     Json json = figuresJson(e.whole, eye_separation);
+    if (!e.counted_with.empty()) json["counted_with"] = e.counted_with;
     json["flipped_triangles"] = e.flipped;
     json["area_distorted_triangles"] = e.area_distorted;
     const auto passes = [](const rig::Penetration& p) {
@@ -102,8 +108,13 @@ void printJson(const transfer::Evaluation& evaluation, const Pairs& pairs, std::
     };
     if (e.result_passes) json["passes"] = passes(*e.result_passes);
     if (e.expected_passes) json["passes_expected"] = passes(*e.expected_passes);
-    for (std::size_t r = 0; r < e.regions.size(); ++r)
-      json["regions"][evaluation.region_names[r]] = figuresJson(e.regions[r], eye_separation);
+    if (e.result_crossings) json["self_intersections"] = e.result_crossings->pairs;
+    if (e.expected_crossings) json["self_intersections_expected"] = e.expected_crossings->pairs;
+    for (std::size_t r = 0; r < e.regions.size(); ++r) {
+      Json& region = json["regions"][evaluation.region_names[r]] = figuresJson(e.regions[r], eye_separation);
+      if (e.result_crossings) region["self_intersections"] = e.result_crossings->regions[r];
+      if (e.expected_crossings) region["self_intersections_expected"] = e.expected_crossings->regions[r];
+    }
     expressions[e.name] = std::move(json);
   }
   const Json out{{"kind", "evaluation"},
@@ -115,9 +126,15 @@ void printJson(const transfer::Evaluation& evaluation, const Pairs& pairs, std::
   std::puts(out.dump(2).c_str());
 }
 
+std::string fixed4(double x) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4f", x);
+  return text;
+}
+
 void printTable(const transfer::Evaluation& evaluation, const Pairs& pairs, std::optional<double> eye_separation) {
   std::printf("%-24s %8s %10s %10s%s %8s %9s%s\n", "expression", "relative", "rms", "maximum",
-              eye_separation ? "  max/eyes" : "", "flipped", "distorted", eye_separation ? "   passes" : "");
+              eye_separation ? "  max/eyes" : "", "flipped", "distorted", eye_separation ? "   passes  crossing" : "");
   for (const transfer::ExpressionEvaluation& e : evaluation.expressions) {
     std::printf("%-24s ", e.name.c_str());
     if (e.whole.relative)
@@ -130,20 +147,34 @@ void printTable(const transfer::Evaluation& evaluation, const Pairs& pairs, std:
     if (eye_separation && e.result_passes)
       std::printf(" %6.2f %%",
                   100 * static_cast<double>(std::max(e.result_passes->lips, e.result_passes->lids)) / *eye_separation);
-    std::puts("");
+    if (e.result_crossings) std::printf(" %4zu/%zu", e.result_crossings->pairs, e.expected_crossings->pairs);
+    std::puts(e.counted_with.empty() ? "" : "  *");
   }
   std::printf("mean relative error of %zu: %.4f\n", evaluation.related, evaluation.mean_relative);
-  if (eye_separation) std::puts("passes: how far lips or lids have gone through each other, of the eye separation");
+  if (eye_separation) {
+    std::puts("passes: how far lips or lids have gone through each other, of the eye separation");
+    std::puts("crossing: pairs of the skin's triangles in lips or lids that go through each other and do not at rest, in "
+              "the result / expected");
+  }
+  for (const transfer::ExpressionEvaluation& e : evaluation.expressions)
+    if (!e.counted_with.empty())
+      std::printf("* %s is made to be added to %s: all but its errors is counted on the sum of both\n", e.name.c_str(),
+                  e.counted_with.c_str());
   if (!evaluation.region_names.empty()) {
-    std::puts("by region, relative error over all expressions:");
+    std::puts("by region, relative error over all expressions; crossing pairs of the result / expected:");
     for (std::size_t r = 0; r < evaluation.region_names.size(); ++r) {
       double error2 = 0, expected2 = 0;
+      std::size_t result_crossings = 0, expected_crossings = 0;
       for (const transfer::ExpressionEvaluation& e : evaluation.expressions) {
         error2 += e.regions[r].rms * e.regions[r].rms;
         expected2 += e.regions[r].expected_rms * e.regions[r].expected_rms;
+        if (e.result_crossings) result_crossings += e.result_crossings->regions[r];
+        if (e.expected_crossings) expected_crossings += e.expected_crossings->regions[r];
       }
-      if (expected2 > 0)
-        std::printf("  %-18s %8.4f\n", evaluation.region_names[r].c_str(), std::sqrt(error2 / expected2));
+      if (expected2 > 0 || result_crossings > 0)
+        std::printf("  %-18s %8s %6zu/%zu\n", evaluation.region_names[r].c_str(),
+                    expected2 > 0 ? fixed4(std::sqrt(error2 / expected2)).c_str() : "", result_crossings,
+                    expected_crossings);
     }
   }
   for (const std::string& name : pairs.without_truth) std::printf("no truth for %s\n", name.c_str());
@@ -154,7 +185,7 @@ int run(const Options& options) {
   requireReadable(options.neutral);
   if (!options.picture.empty()) requireReplaceable(options.picture);
   for (const std::string& folder : {options.results, options.truth})
-    if (!std::filesystem::is_directory(folder)) throw CommandError(kNoInput, folder + ": no such folder of meshes");
+    if (!folder.empty() && !std::filesystem::is_directory(folder)) throw CommandError(kNoInput, folder + ": no such folder of meshes");
   const rig::Mesh neutral = rig::readMesh(options.neutral);
   rig::VertexPositions truth_neutral = neutral.positions;
   if (!options.truth_neutral.empty()) {
@@ -182,10 +213,18 @@ int run(const Options& options) {
     eye_separation = rig.fapu.fapu.eye_separation;
     contacts = rig.contacts;
     scope.contacts = &contacts;
+    scope.eye_separation = rig.fapu.fapu.eye_separation;
     mesh_from_head = rig.mesh_from_head;
   }
-  const Pairs pairs =
-      pairUp(transfer::readMeshSet(options.results, neutral), transfer::readMeshSet(options.truth, neutral));
+  transfer::MeshSet results = transfer::readMeshSet(options.results, neutral);
+  transfer::MeshSet truths;
+  if (options.truth.empty()) {
+    truths.names = results.names;
+    truths.positions.assign(results.size(), truth_neutral);
+  } else {
+    truths = transfer::readMeshSet(options.truth, neutral);
+  }
+  const Pairs pairs = pairUp(std::move(results), std::move(truths));
   if (pairs.names.empty())
     throw CommandError(kBadData, options.results + " and " + options.truth + ": no file name is in both folders");
   const transfer::Evaluation evaluation =
@@ -211,8 +250,9 @@ int run(const Options& options) {
 RunVerb defineEvaluate(CLI::App& app) {
   auto options = std::make_shared<Options>();
   app.add_option("results", options->results, "folder of the meshes to judge")->required()->type_name("DIR");
-  app.add_option("--truth", options->truth, "folder of the meshes they should be, same file names")
-      ->required()
+  app.add_option("--truth", options->truth,
+                 "folder of the meshes they should be, same file names; without it they are compared with the face at "
+                 "rest: what turned over, what goes through itself, and how far it moved")
       ->type_name("DIR");
   app.add_option("--neutral", options->neutral, "the face at rest that the results belong to")
       ->required()
