@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "rig/mesh_io.h"
+#include "rig/obj_series.h"
 
 namespace volto::transfer {
 MeshSet readMeshSet(const std::filesystem::path& folder, const rig::Mesh& neutral, int threads) {
@@ -23,14 +24,13 @@ MeshSet readMeshSet(const std::filesystem::path& folder, const rig::Mesh& neutra
     throw rig::InputError(folder.string() + ": two meshes are called \"" + *twice + "\"; rename or remove one");
 
   set.positions.resize(set.size());
+  rig::ObjSeries series(neutral);
   std::vector<std::exception_ptr> failures(set.size());
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
     for (std::size_t i = next++; i < set.size(); i = next++) {
       try {
-        rig::Mesh mesh = rig::readMesh(set.files[i]);
-        rig::requireSameTopology(neutral, mesh, set.files[i].string());
-        set.positions[i] = std::move(mesh.positions);
+        set.positions[i] = series.read(set.files[i]);
       } catch (...) {
         failures[i] = std::current_exception();
       }
