@@ -8,8 +8,33 @@
 namespace volto::transfer {
 namespace {
 
-Eigen::Vector3d scaleAt(const rig::Rig& rig, const MaskPlace& place) {
-  const rig::FeaturePointPositions scale = rig::fapuScale(rig.fapu.fapu);
+// How well a ratio of two faces' units can be known. A unit is one distance between two or three points, each of which is
+// placed to some hundredths of the eye separation (rig/fitting/README.md).
+constexpr double kUnitNoise = 0.05;
+
+double spreadOf(const rig::FeaturePointPositions& points) {
+  return std::sqrt((points.rowwise() - points.colwise().mean()).squaredNorm());
+}
+
+// The target's units by the source's. What is between a unit's ratio and the ratio of the whole faces counts the less the
+// more it is what the points' places alone would make (the estimate of least expected error, as James and Stein have
+// it): a mouth that is two hundredths wider than the face would have it is none, one that is twice as wide is.
+rig::Fapu steadied(const rig::Rig& source, const rig::Rig& target) {
+  const double whole = std::log(spreadOf(target.feature_positions) / spreadOf(source.feature_positions));
+  const auto unit = [&](double of_source, double of_target) {
+    const double off = std::log(of_target / of_source) - whole;
+    return of_source * std::exp(whole + off * off * off / (off * off + kUnitNoise * kUnitNoise));
+  };
+  const rig::Fapu &s = source.fapu.fapu, &t = target.fapu.fapu;
+  return {.iris_diameter = unit(s.iris_diameter, t.iris_diameter),
+          .eye_separation = unit(s.eye_separation, t.eye_separation),
+          .eye_nose = unit(s.eye_nose, t.eye_nose),
+          .mouth_nose = unit(s.mouth_nose, t.mouth_nose),
+          .mouth_width = unit(s.mouth_width, t.mouth_width)};
+}
+
+Eigen::Vector3d scaleAt(const rig::Fapu& fapu, const MaskPlace& place) {
+  const rig::FeaturePointPositions scale = rig::fapuScale(fapu);
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < 3; ++i)
     sum += place.barycentric[i] * scale.row(rig::maskTriangles()[place.triangle][i]).transpose();
@@ -26,7 +51,7 @@ std::uint32_t vertexOf(const rig::RefinedMask& mask, std::size_t point, const ri
 }  // namespace
 
 Eigen::Vector3d fapuRatio(const rig::Rig& source, const rig::Rig& target, const MaskPlace& place) {
-  return scaleAt(target, place).cwiseQuotient(scaleAt(source, place));
+  return scaleAt(steadied(source, target), place).cwiseQuotient(scaleAt(source.fapu.fapu, place));
 }
 
 MaskTransfer::MaskTransfer(const rig::Rig& source, const rig::Rig& target)

@@ -10,7 +10,8 @@
 
 namespace volto::transfer {
 
-// How much longer a displacement is on the target than on the source at a place of the mask, along the head's axes.
+// How much longer a displacement is on the target than on the source at a place of the mask, along the head's axes: the
+// ratio of their FAPU, steadied by that of the whole faces where the two are as near as points are exact.
 Eigen::Vector3d fapuRatio(const rig::Rig& source, const rig::Rig& target, const MaskPlace& place);
 
 // Const calls from several threads are fine. Borrows `source` and `target`.

@@ -93,6 +93,23 @@ TEST(MaskTransfer, TurnedAndEnlargedHeadDoesTheSameTurnedAndEnlarged) {
   EXPECT_GT((own - source.neutral.positions).rowwise().norm().maxCoeff(), 0.01 * size);
 }
 
+// A unit is a distance between two or three points, which are never quite where they should be.
+TEST(MaskTransfer, MouthThatIsHardlyWiderIsTheSameMouthAndOneTwiceAsWideIsNot) {
+  const rig::Rig source = rigOf(test::makeTestHead(), 0);
+  const MaskPlace corner = placesOf(drivingMask(source))[rig::featurePointIndex("8.3").value()];
+  const auto sideways = [&](double wider) {
+    rig::Rig target = source;
+    target.fapu.fapu.mouth_width *= wider;
+    return fapuRatio(source, target, corner).x();
+  };
+  EXPECT_EQ(sideways(1), 1);
+  EXPECT_NEAR(sideways(1.02), 1, 0.004);
+  EXPECT_NEAR(sideways(1 / 1.02), 1, 0.004);
+  EXPECT_NEAR(sideways(2), 2, 0.02);
+  EXPECT_NEAR(sideways(0.5), 0.5, 0.005);
+  EXPECT_LT(sideways(1.1), sideways(1.2));
+}
+
 // The same surface with other triangles, subdivided otherwise: vertices that are in both meshes go to the same place.
 TEST(MaskTransfer, MeshesAndMasksOfAnotherFinenessAgree) {
   const rig::Rig fine = rigOf(test::makeTestHead({.subdivisions = 4}), 2), coarse = rigOf(test::makeTestHead({.subdivisions = 3}), 1);
