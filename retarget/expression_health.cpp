@@ -9,6 +9,8 @@
 #include <Eigen/Geometry>
 
 #include "rig/closest_point.h"
+#include "rig/control_mask.h"
+#include "rig/parallel.h"
 
 namespace volto::retarget {
 namespace {
@@ -58,8 +60,7 @@ struct HealthMeasure::State {
   std::vector<bool> of_skin;  // per triangle
   std::vector<SlitSides> slits;
   std::vector<std::uint8_t> unmoved;
-  rig::VertexPositions scratch;
-  double es, outward = 1;
+  double es, outward = 1;  // -1: polygons run clockwise, normals point inwards
   std::array<std::int32_t, kFeaturePointCount> feature_vertex{};
   Eigen::Matrix3d mesh_from_head;
 
@@ -70,7 +71,6 @@ struct HealthMeasure::State {
         neutral(rig.neutral.vertexCount()),
         positions(neutral.size()),
         unmoved(neutral.size(), 0),
-        scratch(rig.neutral.positions),
         es(rig.fapu.fapu.eye_separation),
         feature_vertex(rig.feature_vertex),
         mesh_from_head(rig.mesh_from_head) {
@@ -91,7 +91,22 @@ struct HealthMeasure::State {
         return rig.association.kind[v] == rig::AssociationKind::rigid_part;
       }));
     }
+    outward = sideOfNormals(rig);
     for (const rig::SlitContact& slit : contacts.slits) addSlit(slit);
+  }
+
+  // Which way the face's triangles look, beside those of the mask over them.
+  double sideOfNormals(const rig::Rig& rig) const {
+    double agreement = 0;
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+      const std::uint32_t v = triangles[t][0];
+      if (rig.association.kind[v] != rig::AssociationKind::ray) continue;
+      const auto& mask = rig::maskTriangles()[static_cast<std::size_t>(rig.association.triangle[v])];
+      const auto corner = [&](std::size_t k) -> Eigen::Vector3d { return rig.feature_positions.row(mask[k]); };
+      agreement +=
+          rest_normal[t].dot((corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized());
+    }
+    return agreement < 0 ? -1 : 1;
   }
 
   void addSlit(const rig::SlitContact& slit) {
@@ -126,9 +141,10 @@ struct HealthMeasure::State {
 
   // How deep each probe of one side is below the other side's surface; 0 outside, and where only the surface's border
   // is near.
-  std::vector<double> depths(const Side& side, const Side& other, std::span<const Vertex> pose) {
+  std::vector<double> depths(const Side& side, const Side& other, std::span<const Vertex> pose) const {
     std::vector<double> out(side.probes.size(), 0.0);
     if (other.triangles.empty()) return out;
+    rig::VertexPositions scratch(static_cast<Eigen::Index>(pose.size()), 3);  // filled where it is looked at
     for (const Triangle& t : other.triangles) {
       for (const std::uint32_t v : t) scratch.row(v) = at(pose, v).transpose();
     }
@@ -149,7 +165,7 @@ struct HealthMeasure::State {
       // edge or a vertex all around it say what is inside (Baerentzen, Aanaes, "Signed distance computation using the
       // angle weighted pseudonormal", 2005).
       const Eigen::Vector3d normal = pseudonormal(other, t, nearest.barycentric, pose);
-      if (normal.dot(p - q) < 0 && normal.dot(vertexNormal(side, side.probes[i], pose)) < 0) out[i] = nearest.distance;
+      if (outward * normal.dot(p - q) < 0 && normal.dot(vertexNormal(side, side.probes[i], pose)) < 0) out[i] = nearest.distance;
     }
     return out;
   }
@@ -182,7 +198,8 @@ struct HealthMeasure::State {
     return sum;
   }
 
-  double deepest(const Side& side, const Side& other, const std::vector<double>& rest, std::span<const Vertex> pose) {
+  double deepest(const Side& side, const Side& other, const std::vector<double>& rest,
+                 std::span<const Vertex> pose) const {
     const std::vector<double> now = depths(side, other, pose);
     double out = 0;
     for (std::size_t i = 0; i < now.size(); ++i) out = std::max(out, now[i] - rest[i]);
@@ -241,8 +258,8 @@ struct HealthMeasure::State {
 HealthMeasure::HealthMeasure(const rig::Rig& rig) : state_(std::make_unique<State>(rig)) {}
 HealthMeasure::~HealthMeasure() = default;
 
-PoseHealth HealthMeasure::measure(const std::string& name, std::span<const Vertex> pose) {
-  State& s = *state_;
+PoseHealth HealthMeasure::measure(const std::string& name, std::span<const Vertex> pose) const {
+  const State& s = *state_;
   PoseHealth out;
   out.name = name;
   for (std::size_t t = 0; t < s.triangles.size(); ++t) {
@@ -266,28 +283,30 @@ PoseHealth HealthMeasure::measure(const std::string& name, std::span<const Verte
   return out;
 }
 
-PoseHealth HealthMeasure::measureWeights(const std::string& name, std::span<const float> weights) {
-  state_->deformer.deformAtWeights(weights, state_->positions);
-  return measure(name, state_->positions);
+PoseHealth HealthMeasure::measureWeights(const std::string& name, std::span<const float> weights) const {
+  std::vector<Vertex> positions(state_->neutral.size());
+  state_->deformer.deformAtWeights(weights, positions);
+  return measure(name, positions);
 }
 
 ExpressionHealth HealthMeasure::measureAll() {
   State& s = *state_;
   ExpressionHealth out;
   out.triangles = s.triangles.size();
-  std::vector<float> weights(s.names.size(), 0.0F);
-  for (std::size_t k = 0; k < s.names.size(); ++k) {
+  out.shapes.resize(s.names.size());
+  std::vector<double> border(s.names.size(), 0.0);
+  rig::parallelFor(s.names.size(), [&](std::size_t k) {
+    std::vector<float> weights(s.names.size(), 0.0F);
     weights[k] = 1;
-    out.shapes.push_back(measureWeights(s.names[k], weights));
-    weights[k] = 0;
-    for (std::size_t v = 0; v < s.neutral.size(); ++v) {
-      if (s.unmoved[v] == 0) continue;
-      out.border_es = std::max(
-          out.border_es,
-          (at(s.positions, static_cast<std::uint32_t>(v)) - at(s.neutral, static_cast<std::uint32_t>(v))).norm() /
-              s.es);
-    }
-  }
+    std::vector<Vertex> positions(s.neutral.size());
+    s.deformer.deformAtWeights(weights, positions);
+    out.shapes[k] = measure(s.names[k], positions);
+    for (std::uint32_t v = 0; v < s.neutral.size(); ++v)
+      if (s.unmoved[v] != 0) border[k] = std::max(border[k], (at(positions, v) - at(s.neutral, v)).norm() / s.es);
+  });
+  out.border_es = border.empty() ? 0 : *std::max_element(border.begin(), border.end());
+  std::vector<std::pair<std::string, std::vector<float>>> combined;
+  std::vector<float> weights(s.names.size(), 0.0F);
   for (const rig::NamedPose& pose : rig::combinedExpressions()) {
     std::fill(weights.begin(), weights.end(), 0.0F);
     bool known = true;
@@ -296,8 +315,12 @@ ExpressionHealth HealthMeasure::measureAll() {
       known &= found != s.names.end();
       if (known) weights[static_cast<std::size_t>(found - s.names.begin())] = weight;
     }
-    if (known) out.combinations.push_back(measureWeights(pose.name, weights));
+    if (known) combined.emplace_back(pose.name, weights);
   }
+  out.combinations.resize(combined.size());
+  rig::parallelFor(combined.size(), [&](std::size_t i) {
+    out.combinations[i] = measureWeights(combined[i].first, combined[i].second);
+  });
   out.blink_gap_es = s.blinkGap();
   out.symmetry_es = s.asymmetry();
   return out;

@@ -37,16 +37,16 @@ struct ExpressionHealth {
   PoseHealth worst() const;  // the largest of each number; name: of the pose with most flips
 };
 
-// Measures poses of one character. Thread-bound (keeps its buffers); borrows nothing.
+// Measures poses of one character. Const functions may run at once; borrows nothing.
 class HealthMeasure {
  public:
   explicit HealthMeasure(const rig::Rig& rig);
   ~HealthMeasure();
 
   // Of positions that came from anywhere, #V.
-  PoseHealth measure(const std::string& name, std::span<const Vertex> positions);
+  PoseHealth measure(const std::string& name, std::span<const Vertex> positions) const;
   // Of weights, one per blendshape.
-  PoseHealth measureWeights(const std::string& name, std::span<const float> weights);
+  PoseHealth measureWeights(const std::string& name, std::span<const float> weights) const;
   ExpressionHealth measureAll();
 
  private:

@@ -50,6 +50,25 @@ class HeadExpressions : public ::testing::TestWithParam<const char*> {
 
 float distance(const Vertex& a, const Vertex& b) { return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]); }
 
+TEST_P(HeadExpressions, HealthIsTheSameWhicheverWayPolygonsRun) {
+  rig::Rig inside_out = rig();
+  rig::Mesh& mesh = inside_out.neutral;
+  for (std::size_t p = 0; p < mesh.polygonCount(); ++p)
+    std::reverse(mesh.corner_vertices.begin() + mesh.polygon_start[p] + 1,  // quads are cut the same way
+                 mesh.corner_vertices.begin() + mesh.polygon_start[p + 1]);
+  const HealthMeasure one(rig()), other(inside_out);
+  // Lips and lids far into each other, as no contact leaves them.
+  std::vector<Vertex> pose = rig::neutralPositions(rig());
+  for (const rig::SlitContact& slit : rig().contacts.slits)
+    for (std::size_t i = 0; i < slit.vertex.size(); ++i)
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        pose[slit.vertex[i]][axis] -= 0.05F * es() * slit.share[i] * slit.up[axis];
+  const PoseHealth a = one.measure("", pose), b = other.measure("", pose);
+  EXPECT_GT(a.lips_depth_es, 0.005);
+  EXPECT_NEAR(a.lips_depth_es, b.lips_depth_es, 1e-3);
+  EXPECT_NEAR(a.lids_depth_es, b.lids_depth_es, 1e-3);
+}
+
 TEST_P(HeadExpressions, NoWeightsAreNeutralToTheBit) { EXPECT_EQ(posed({}), rig::neutralPositions(rig())); }
 
 TEST_P(HeadExpressions, NothingFoldsPassesOrGapes) {
