@@ -171,7 +171,7 @@ class ObjParser {
   }
 
   void vertex() {
-    if (coordinates_.size() / 3 >= kMaxVertices) fail("more than 1000000 vertices");
+    if (coordinates_.size() / 3 >= kMaxVertices) fail("more than 1000000 vertices; reduce the mesh");
     for (int i = 0; i < 3; ++i) coordinates_.push_back(number("vertex"));
     // Some programs add a weight, or a colour, or both.
     std::array<float, 4> extra{};

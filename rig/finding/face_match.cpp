@@ -9,6 +9,7 @@ namespace {
 constexpr FlowLevel kCoarseLevels[] = {{0.2, 0.45, 6}, {0.12, 0.35, 6}};
 constexpr FlowLevel kFineLevels[] = {{0.08, 0.25, 8}, {0.05, 0.2, 8}};
 constexpr double kComparedAt = 0.08;
+constexpr double kMouthAtLeast = 0.8;  // as likely as eyes and nose, whatever it looks like
 
 // Where the template's pixels are on the other relief gives turn, size and place anew.
 FaceFrame bettered(const FaceFrame& frame, const FaceMatch& match, const Relief& relief, const Grid& mask) {
@@ -73,7 +74,9 @@ void judge(FaceMatch& match, std::size_t level) {
   for (std::size_t i = 0; i < 4; ++i) match.parts[i] = parts[i].mean();
   // Hair may hang over one eye.
   const double eyes = 0.75 * std::max(match.parts[0], match.parts[1]) + 0.25 * std::min(match.parts[0], match.parts[1]);
-  match.likeness = (eyes + match.parts[2] + match.parts[3]) / 6 + std::min({eyes, match.parts[2], match.parts[3]}) / 2;
+  // A mouth may be open: where eyes and nose are a face's beyond doubt, it need not look like the template's.
+  const double nose = match.parts[2], mouth = match.parts[3], others = std::min(eyes, nose);
+  match.likeness = (eyes + nose + mouth) / 6 + std::min(others, std::max(mouth, kMouthAtLeast * others)) / 2;
 }
 
 }  // namespace

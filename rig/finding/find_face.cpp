@@ -67,17 +67,36 @@ std::vector<SurfaceSample> besides(const std::vector<SurfaceSample>& samples, co
   return rest;
 }
 
+// Behind a socket without its eyeball the relief is deep: a landmark that comes out far behind where the others have it
+// is taken from the generic face.
+void liftOutOfHoles(const std::vector<Eigen::Vector3d>& generic, std::vector<Eigen::Vector3d>& places) {
+  constexpr double kTooDeep = 0.2;  // eye separations
+  std::vector<double> behind;
+  for (std::size_t i = 0; i < places.size(); ++i) behind.push_back(places[i].z() - generic[i].z());
+  std::vector<double> sorted = behind;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  for (std::size_t i = 0; i < places.size(); ++i)
+    if (behind[i] < *middle - kTooDeep) places[i].z() = generic[i].z() + *middle;
+}
+
 std::vector<RoughLandmark> landmarksOf(const FaceMatch& match, const NormalisedSurface& surface, double confidence) {
   std::vector<RoughLandmark> landmarks;
   std::vector<Eigen::Vector2d> generic;
+  std::vector<Eigen::Vector3d> generic_places, places;
   for (const auto& [id, shift] : kLandmarks) {
     const std::size_t point = *featurePointIndex(id);
     generic.push_back(faceTemplate().landmarks.row(static_cast<Eigen::Index>(point)).head<2>());
     const Eigen::Vector2d p = match.flow.carry(generic.back()) + Eigen::Vector2d(shift[0], shift[1]);
     const Eigen::Vector2d at = Relief::pixelsOf(p.x(), p.y(), match.relief.pixel);
     const double z = match.relief.depth.sample(static_cast<float>(at.x()), static_cast<float>(at.y()));
-    landmarks.push_back({point, surface.centre + surface.size * match.frame.toMesh({p.x(), p.y(), z}), 0});
+    generic_places.emplace_back(faceTemplate().landmarks.row(static_cast<Eigen::Index>(point)));
+    places.emplace_back(p.x(), p.y(), z);
+    landmarks.push_back({point, Eigen::Vector3d::Zero(), 0});
   }
+  liftOutOfHoles(generic_places, places);
+  for (std::size_t i = 0; i < places.size(); ++i)
+    landmarks[i].position = surface.centre + surface.size * match.frame.toMesh(places[i]);
   const std::vector<double> likeness = likenessAround(match, generic, 0.2);
   for (std::size_t i = 0; i < landmarks.size(); ++i) landmarks[i].confidence = confidence * likeness[i];
   return landmarks;

@@ -15,6 +15,7 @@
 #include "rig/finding/find_face.h"
 #include "rig/head_frame.h"
 #include "rig/mesh_io.h"
+#include "rig/skin.h"
 #include "tests/rig/finding_shapes.h"
 #include "tests/rig/fitting_support.h"
 #include "tests/support/test_data.h"
@@ -123,9 +124,54 @@ INSTANTIATE_TEST_SUITE_P(
                     Head{"makehuman/caucasian-female-young/neutral.obj", "makehuman_feature_points.json", 0.05}),
     [](const testing::TestParamInfo<Head>& head) {
       std::string name(head.param.mesh);
-      std::replace_if(name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) == 0; }, '_');
+      std::replace_if(
+          name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) == 0; }, '_');
       return name;
     });
+
+test::KnownHead headByOthers(const std::filesystem::path& data, const char* mesh, const char* points) {
+  return test::KnownHead::read(data / "meshes" / mesh, volto::test::sourceDir() / "tests/rig" / points);
+}
+
+TEST(ShapedByOthers, IsFoundWithItsMouthOpen) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "SKIPPED: measured in the plain build";
+#endif
+  VOLTO_REQUIRE_DATA(data);
+  test::KnownHead head = headByOthers(data, "ict/person_a.obj", "ict_feature_points.json");
+  const Mesh neutral = readMesh(data / "meshes/ict/neutral.obj"),
+             open = readMesh(data / "meshes/ict/expressions/jawOpen.obj");
+  head.mesh.positions += 0.25 * (open.positions - neutral.positions);
+  const FoundFace face = findFace(head.mesh);
+  const FindingError error = errorOf(face, head);
+  show("mouth open", 0, error, face, 0);
+  EXPECT_LT(error.rotation_deg, 10);
+  EXPECT_LT(error.mean, 0.08);
+  EXPECT_GT(face.confidence, 0.7);
+}
+
+TEST(ShapedByOthers, WithoutEyeballsHasTheCornersOfItsEyesOnTheLidsAllTheSame) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "SKIPPED: measured in the plain build";
+#endif
+  VOLTO_REQUIRE_DATA(data);
+  test::KnownHead head =
+      headByOthers(data, "makehuman/caucasian-female-young/neutral.obj", "makehuman_feature_points.json");
+  std::vector<std::uint32_t> same_as(head.mesh.vertexCount());
+  std::iota(same_as.begin(), same_as.end(), 0U);
+  const Skin skin = prepareSkin(head.mesh, std::move(same_as));
+  const auto nose = std::get<std::uint32_t>(head.truth.at(featurePointIndex("9.3").value()));
+  test::KnownHead bare = head;
+  bare.mesh = test::cropped(head.mesh, [&](std::uint32_t v) { return skin.component[v] == skin.component[nose]; });
+  ASSERT_LT(bare.mesh.polygonCount(), head.mesh.polygonCount());
+  // Vertices keep their order, not their numbers.
+  for (std::size_t p = 0; p < kFeaturePointCount; ++p) bare.truth[p] = head.at(featurePoints()[p].id);
+  const FoundFace face = findFace(bare.mesh);
+  const FindingError error = errorOf(face, bare);
+  show("without eyeballs", 0, error, face, 0);
+  EXPECT_LT(error.mean, 0.06);
+  EXPECT_LT(error.worst, 0.2);
+}
 
 TEST(ShippedHead, IsFoundHoweverItLies) { expectFound({"volto_head.obj", "", 0.11}, adult(), 2); }
 
