@@ -343,7 +343,8 @@ class ContactFinder {
               [](const Rider& a, const Rider& b) { return a.vertex < b.vertex; });
   }
 
-  // The lid that most of the part's own rows follow.
+  // The lid that most of the part's own rows follow, of the eye whose lids they follow: one piece may hold the lashes of
+  // both lids and follow neither much.
   SlitSide lidOf(const RigidPart& part) const {
     std::array<double, 7> following{};
     for (const std::uint32_t v : part.vertices)
@@ -354,8 +355,11 @@ class ContactFinder {
     for (const std::uint32_t v : part.vertices)
       for (std::uint32_t e = rig_.deformation.row_start[v]; e < rig_.deformation.row_start[v + 1]; ++e)
         total += static_cast<double>(rig_.deformation.weight[e]);
-    const auto most = std::max_element(following.begin() + 3, following.end());  // lids alone
-    return *most > 0.3 * total ? static_cast<SlitSide>(most - following.begin()) : SlitSide::none;
+    const auto of = [&](SlitSide lid) { return following[static_cast<std::size_t>(lid)]; };
+    for (const auto& [upper, lower] : {std::pair{SlitSide::left_upper_lid, SlitSide::left_lower_lid},
+                                       std::pair{SlitSide::right_upper_lid, SlitSide::right_lower_lid}})
+      if (of(upper) + of(lower) > 0.3 * total) return of(upper) > of(lower) ? upper : lower;
+    return SlitSide::none;
   }
 
   // The slit that lashes of a lid grow around; null where it was not found.
