@@ -14,6 +14,7 @@ namespace volto::transfer {
 namespace {
 
 constexpr double kHoldsTeethEs = 0.03;
+constexpr double kHoldsLeast = 0.5;  // of the motion: what goes by less holds the upper teeth, if any
 
 // Two axes in the triangle, one off it; orthonormal, so that lashes do not stretch with the lid.
 Eigen::Matrix3d frameOf(const rig::VertexPositions& p, const std::array<std::uint32_t, 3>& t) {
@@ -53,26 +54,34 @@ PartTransfer::PartTransfer(const rig::Rig& source, const rig::Rig& target) : sou
       }
     }
     t.share.assign(t.target.size(), 1.0);
-    // Gums of both jaws in one piece go along by what is near the lower teeth (rig/rigid_parts.h); what holds the
-    // teeth goes as they do.
+    // Gums of both jaws in one piece go along by what is near the lower teeth (rig/rigid_parts.h): those of the upper jaw
+    // stay, what holds the lower teeth goes as they do.
+    std::vector<double> share(target.neutral.vertexCount(), 0.0);
+    bool known = false;
     for (const rig::PartMotion& motion : target.part_motions) {
       if (motion.follows != follows) continue;
-      std::vector<double> share(target.neutral.vertexCount(), 1.0);
+      known = true;
       for (std::size_t i = 0; i < motion.vertices.size(); ++i)
         share[motion.vertices[i]] = static_cast<double>(motion.share[i]);
+    }
+    if (known) {
       const double near = kHoldsTeethEs * target.fapu.fapu.eye_separation;
-      double sum = 0, count = 0;
+      std::vector<double> holding;
       for (const std::uint32_t v : t.target) {
-        if (share[v] >= 1) continue;
+        if (share[v] >= 1 || share[v] < kHoldsLeast) continue;
         const Eigen::RowVector3d here = target.neutral.positions.row(v);
         const bool holds = std::any_of(t.middle.begin(), t.middle.end(), [&](std::uint32_t tooth) {
           return share[tooth] == 1 && (target.neutral.positions.row(tooth) - here).squaredNorm() < near * near;
         });
-        if (!holds) continue;
-        sum += share[v];
-        ++count;
+        if (holds) holding.push_back(share[v]);
       }
-      const double full = sum > 0 ? sum / count : 1.0;
+      // Nearly all of it, so that no edge of the gums stays behind above the teeth.
+      double full = 1;
+      if (!holding.empty()) {
+        const auto few = holding.begin() + static_cast<std::ptrdiff_t>(holding.size() / 20);
+        std::nth_element(holding.begin(), few, holding.end());
+        full = *few;
+      }
       for (std::size_t i = 0; i < t.target.size(); ++i) t.share[i] = std::min(1.0, share[t.target[i]] / full);
     }
     if (t.source.size() >= 3 && !t.target.empty()) turning_.push_back(std::move(t));
