@@ -1,11 +1,15 @@
 #include "capture/detection/crop.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstring>
 #include <initializer_list>
 #include <stdexcept>
 #include <utility>
 #include <vector>
+
+#include <hwy/cache_control.h>
 
 #include "capture/detection/crop_kernel.h"
 
@@ -38,7 +42,6 @@ Axes axesOf(const FaceAnchors& p) {
 }
 
 constexpr double kOne = 1 << kFixedBits;
-constexpr int kMostTaps = 8;
 constexpr double kHalveFrom = 2.5;  // pixels of the image per pixel of the crop
 
 // Largest integer below; std::floor is a call where the processor is not known to have SSE 4.1.
@@ -93,6 +96,40 @@ std::array<int, 3> sumOf(const Pixels& pixels, std::int64_t x, std::int64_t y, s
   return sum;
 }
 
+// The rectangle of an image that a crop covers, and `around` to each side; cut off at the image's border.
+struct Covered {
+  int left, top, right, bottom;
+};
+
+Covered coveredBy(const Image& image, const ImageFromCrop& image_from_crop, int width, int height, double around) {
+  double low_x = image.width, low_y = image.height, high_x = 0, high_y = 0;
+  for (const auto& [x, y] : {std::pair{0, 0}, {width, 0}, {0, height}, {width, height}}) {
+    const auto at = image_from_crop(x, y);
+    low_x = std::min<double>(low_x, at[0]);
+    low_y = std::min<double>(low_y, at[1]);
+    high_x = std::max<double>(high_x, at[0]);
+    high_y = std::max<double>(high_y, at[1]);
+  }
+  const auto within = [around](double v, double direction, int size) {
+    return static_cast<int>(std::clamp(v + direction * around, 0.0, static_cast<double>(size)));
+  };
+  return {within(low_x, -1, image.width), within(low_y, -1, image.height), within(high_x, 1, image.width),
+          within(high_y, 1, image.height)};
+}
+
+// The picture was written by another thread and may lie anywhere. Sampled at an angle it would come line by line, each
+// waited for; asked for beforehand it comes all at once.
+void fetch(const Image& image, const Covered& part) {
+  constexpr std::size_t kLine = 64;
+  for (int y = part.top; y < part.bottom; ++y) {
+    const std::uint8_t* const row =
+        image.bgr.data() + 3 * static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width);
+    for (std::size_t at = 3 * static_cast<std::size_t>(part.left); at < 3 * static_cast<std::size_t>(part.right);
+         at += kLine)
+      hwy::Prefetch(row + at);
+  }
+}
+
 // Whether a crop lies within the image so far that no sample, nor what is beside it, is outside.
 bool liesInside(const Image& image, const ImageFromCrop& image_from_crop, int width, int height) {
   for (const auto& [x, y] : {std::pair{0, 0}, {width, 0}, {0, height}, {width, height}}) {
@@ -107,19 +144,8 @@ bool liesInside(const Image& image, const ImageFromCrop& image_from_crop, int wi
 // Where a face is large that is much less to look at than every pixel by itself. False when nothing is left of it.
 bool halve(const Image& image, const ImageFromCrop& image_from_crop, int width, int height, Image& out,
            ImageFromCrop& out_from_crop) {
-  double low_x = image.width, low_y = image.height, high_x = 0, high_y = 0;
-  for (const auto& [x, y] : {std::pair{0, 0}, {width, 0}, {0, height}, {width, height}}) {
-    const auto at = image_from_crop(x, y);
-    low_x = std::min<double>(low_x, at[0]);
-    low_y = std::min<double>(low_y, at[1]);
-    high_x = std::max<double>(high_x, at[0]);
-    high_y = std::max<double>(high_y, at[1]);
-  }
   constexpr double kAround = 8;  // more than a sample reaches, twice as large
-  const int left = static_cast<int>(std::clamp(low_x - kAround, 0.0, static_cast<double>(image.width)));
-  const int top = static_cast<int>(std::clamp(low_y - kAround, 0.0, static_cast<double>(image.height)));
-  const int right = static_cast<int>(std::clamp(high_x + kAround, 0.0, static_cast<double>(image.width)));
-  const int bottom = static_cast<int>(std::clamp(high_y + kAround, 0.0, static_cast<double>(image.height)));
+  const auto [left, top, right, bottom] = coveredBy(image, image_from_crop, width, height, kAround);
   if (right - left < 2 || bottom - top < 2) return false;
   out.resize((right - left) / 2, (bottom - top) / 2);
   const std::size_t row_bytes = 3 * static_cast<std::size_t>(image.width);
@@ -133,6 +159,8 @@ bool halve(const Image& image, const ImageFromCrop& image_from_crop, int width, 
                    0.5 * (image_from_crop.ty - top)};
   return true;
 }
+
+static_assert(std::endian::native == std::endian::little, "colours are taken apart by their place in a number");
 
 // The same samples of a crop that is not turned (a detector's): each line of them lies in one row of the image, and
 // below each other they are in the same columns. So the rows are added first, bytes side by side, then the columns.
@@ -157,32 +185,34 @@ class UprightAverage {
         end = std::max(end, columns_.back() + 1);
       }
     }
-    sums_.resize(3 * static_cast<std::size_t>(std::max(end - first_, 0)));
+    sums_.resize(3 * static_cast<std::size_t>(std::max(end - first_, 0)) + 1);
   }
 
   // put(column, blue, green, red), sums of n x n samples.
   template <typename Put>
   void row(int row, const Put& put) {
-    std::fill(sums_.begin(), sums_.end(), std::uint16_t{0});  // at most 8 bytes
+    std::array<const std::uint8_t*, kMostTaps> rows{};
+    std::size_t count = 0;
     for (int i = 0; i < n_; ++i) {
       const double y0 = row + (i + 0.5) * (1.0 / n_);
       const auto y = static_cast<int>(floorOf((image_from_crop_.a * y0 + image_from_crop_.ty) * kOne) >> kFixedBits);
       const int last = pixels_.image.height - 1;
       if ((y < 0 || y > last) && pixels_.black_outside) continue;
-      const std::uint8_t* const bytes = pixels_.inside(first_, std::clamp(y, 0, last));
-      for (std::size_t k = 0; k < sums_.size(); ++k) sums_[k] = static_cast<std::uint16_t>(sums_[k] + bytes[k]);
+      rows[count++] = pixels_.inside(first_, std::clamp(y, 0, last));
     }
+    addRows({rows.data(), count}, {sums_.data(), sums_.size() - 1});
+    // Three colours, and what comes after them, in one number: sums of kMostTaps squared bytes fit into 16 bits each.
     const int* column = columns_.data();
     for (std::size_t at = 0; at < columns_.size() / static_cast<std::size_t>(n_); ++at) {
-      unsigned blue = 0, green = 0, red = 0;
+      std::uint64_t colours = 0;
       for (int j = 0; j < n_; ++j, ++column) {
         if (*column == kNothing) continue;
-        const std::uint16_t* const sum = sums_.data() + 3 * static_cast<std::size_t>(*column - first_);
-        blue += sum[0];
-        green += sum[1];
-        red += sum[2];
+        std::uint64_t four = 0;
+        std::memcpy(&four, sums_.data() + 3 * static_cast<std::size_t>(*column - first_), sizeof four);
+        colours += four;
       }
-      put(at, static_cast<float>(blue), static_cast<float>(green), static_cast<float>(red));
+      const auto colour = [&](unsigned c) { return static_cast<float>(colours >> (16 * c) & 0xFFFFU); };
+      put(at, colour(0), colour(1), colour(2));
     }
   }
 
@@ -193,7 +223,7 @@ class UprightAverage {
   int n_;
   int first_ = 0;                    // the image's leftmost column that is looked at
   std::vector<int> columns_;         // of the image, n for each of the crop
-  std::vector<std::uint16_t> sums_;  // of the rows, three colours each, from column first_ on
+  std::vector<std::uint16_t> sums_;  // of the rows, three colours each, from column first_ on; and one number more
 };
 
 void sampleAll(const Image& image, const ImageFromCrop& image_from_crop, int width, int height,
@@ -297,6 +327,7 @@ void sampleCrop(const Image& image, const ImageFromCrop& image_from_crop, int wi
                 const Normalisation& normalisation, bool black_outside, std::span<float> planes) {
   if (planes.size() < 3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height))
     throw std::invalid_argument("too little room for a crop");
+  if (!black_outside) fetch(image, coveredBy(image, image_from_crop, width, height, 1));
   thread_local std::array<Image, 2> halved;  // they keep their memory
   const Image* from = &image;
   ImageFromCrop from_crop = image_from_crop, next;

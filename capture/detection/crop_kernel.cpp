@@ -1,6 +1,7 @@
 #include "capture/detection/crop_kernel.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -16,13 +17,14 @@ namespace HWY_NAMESPACE {
 #if HWY_TARGET == HWY_SCALAR
 bool sampleInsideHere(const CropSamples&) { return false; }
 int halveRowsHere(const std::uint8_t*, const std::uint8_t*, int, std::uint8_t*) { return 0; }
+std::size_t addRowsHere(std::span<const std::uint8_t* const>, std::span<std::uint16_t>) { return 0; }
 #else
 
 namespace hn = hwy::HWY_NAMESPACE;
 
 using Numbers = hn::CappedTag<std::int32_t, 8>;
 using Half = hn::Half<Numbers>;
-using Doubles = hn::Rebind<double, Half>;
+using Pairs = hn::Repartition<std::int64_t, Numbers>;
 using Floats = hn::Rebind<float, Numbers>;
 using NumberVec = hn::Vec<Numbers>;
 
@@ -32,23 +34,22 @@ struct Texels {
   NumberVec row_bytes;
 
   // Blue, green, red and a byte of the next pixel.
-  NumberVec at(NumberVec x, NumberVec y) const {
-    const auto pixel = hn::Add(hn::Add(x, x), x);
-    return hn::GatherOffset(Numbers(), base, hn::Add(hn::Mul(y, row_bytes), pixel));
-  }
-};
+  NumberVec at(NumberVec x, NumberVec y) const { return hn::GatherOffset(Numbers(), base, offset(x, y)); }
 
-// (across + down + along + shift) in fixed point; truncation, so for positive numbers only.
-NumberVec position(const double* across, double down, double along, double shift) {
-  const Doubles d;
-  const std::size_t lanes = hn::Lanes(d);
-  const auto half = [&](const double* from) HWY_ATTR {
-    const auto sum =
-        hn::Add(hn::Add(hn::Add(hn::LoadU(d, from), hn::Set(d, down)), hn::Set(d, along)), hn::Set(d, shift));
-    return hn::DemoteTo(Half(), hn::Mul(sum, hn::Set(d, 1 << kFixedBits)));
-  };
-  return hn::Combine(Numbers(), half(across + lanes), half(across));
-}
+  // A pixel and the one beside it: blue, green, red, blue; then green, red and two bytes of the next but one.
+  // A gather costs by its lanes, so half as many of twice the width cost half.
+  void beside(NumberVec x, NumberVec y, NumberVec& first, NumberVec& second) const {
+    const auto at = offset(x, y);
+    const auto* const from = reinterpret_cast<const std::int64_t*>(base);
+    const auto low = hn::GatherOffset(Pairs(), from, hn::PromoteTo(Pairs(), hn::LowerHalf(Half(), at)));
+    const auto high = hn::GatherOffset(Pairs(), from, hn::PromoteTo(Pairs(), hn::UpperHalf(Half(), at)));
+    first = hn::ConcatEven(Numbers(), hn::BitCast(Numbers(), high), hn::BitCast(Numbers(), low));
+    second = hn::ConcatOdd(Numbers(), hn::BitCast(Numbers(), high), hn::BitCast(Numbers(), low));
+  }
+
+ private:
+  NumberVec offset(NumberVec x, NumberVec y) const { return hn::Add(hn::Mul(y, row_bytes), hn::Add(hn::Add(x, x), x)); }
+};
 
 template <int kShift>
 hn::Vec<Floats> byteOf(NumberVec texel) {
@@ -69,16 +70,16 @@ Colours bilinear(const Texels& texels, NumberVec x, NumberVec y) {
   const auto fx = fraction(x), fy = fraction(y);
   const auto gx = hn::Sub(one, fx), gy = hn::Sub(one, fy);
   const auto x0 = hn::ShiftRight<kFixedBits>(x), y0 = hn::ShiftRight<kFixedBits>(y);
-  const auto step = hn::Set(Numbers(), 1);
-  const auto x1 = hn::Add(x0, step), y1 = hn::Add(y0, step);
-  const auto a = texels.at(x0, y0), b = texels.at(x1, y0), c = texels.at(x0, y1), e = texels.at(x1, y1);
+  NumberVec above, above_right, below, below_right;
+  texels.beside(x0, y0, above, above_right);
+  texels.beside(x0, hn::Add(y0, hn::Set(Numbers(), 1)), below, below_right);
   const auto wa = hn::Mul(gx, gy), wb = hn::Mul(fx, gy), wc = hn::Mul(gx, fy), we = hn::Mul(fx, fy);
   const auto mix = [&](auto va, auto vb, auto vc, auto ve) HWY_ATTR {
     return hn::Add(hn::Add(hn::Add(hn::Mul(wa, va), hn::Mul(wb, vb)), hn::Mul(wc, vc)), hn::Mul(we, ve));
   };
-  return {mix(byteOf<0>(a), byteOf<0>(b), byteOf<0>(c), byteOf<0>(e)),
-          mix(byteOf<8>(a), byteOf<8>(b), byteOf<8>(c), byteOf<8>(e)),
-          mix(byteOf<16>(a), byteOf<16>(b), byteOf<16>(c), byteOf<16>(e))};
+  return {mix(byteOf<0>(above), byteOf<24>(above), byteOf<0>(below), byteOf<24>(below)),
+          mix(byteOf<8>(above), byteOf<0>(above_right), byteOf<8>(below), byteOf<0>(below_right)),
+          mix(byteOf<16>(above), byteOf<8>(above_right), byteOf<16>(below), byteOf<8>(below_right))};
 }
 
 // Sums of up to 64 bytes: 16 bits for each colour, blue and red in one number.
@@ -102,31 +103,35 @@ bool sampleInsideHere(const CropSamples& crop) {
   const ImageFromCrop& m = crop.image_from_crop;
   const int n = crop.taps;
   const double step = 1.0 / n, shift = n == 1 ? -0.5 : 0.0;
-  const auto fixedStep = [&](double v) HWY_ATTR {
-    return hn::Set(Numbers(), static_cast<std::int32_t>(std::llround(v * step * (1 << kFixedBits))));
-  };
-  const auto step_x = fixedStep(m.a), step_y = fixedStep(m.b);
-  std::vector<double> across(2 * static_cast<std::size_t>(crop.width));  // what a column adds to x, then to y
-  double* const across_x = across.data();
-  double* const across_y = across_x + crop.width;
+  const auto fixed = [](double v) { return static_cast<std::int32_t>(std::llround(v * (1 << kFixedBits))); };
+  const auto step_x = hn::Set(Numbers(), fixed(m.a * step)), step_y = hn::Set(Numbers(), fixed(m.b * step));
+  thread_local std::vector<std::int32_t> across;  // what a column adds to x, then to y; fixed point as all places here
+  across.resize(2 * static_cast<std::size_t>(crop.width));
+  std::int32_t* const across_x = across.data();
+  std::int32_t* const across_y = across_x + crop.width;
   for (int column = 0; column < crop.width; ++column) {
     const double x0 = column + 0.5 * step;
-    across_x[column] = m.a * x0;
-    across_y[column] = m.b * x0;
+    across_x[column] = fixed(m.a * x0);
+    across_y[column] = fixed(m.b * x0);
   }
   const Texels texels{reinterpret_cast<const std::int32_t*>(crop.image->bgr.data()),
                       hn::Set(Numbers(), 3 * crop.image->width)};
   const Floats d;
   std::size_t row_start = 0;
+  std::array<std::int32_t, kMostTaps> down_x, down_y;  // what each line of a row's samples adds
   for (int row = 0; row < crop.height; ++row, row_start += static_cast<std::size_t>(crop.width)) {
+    for (std::size_t i = 0; i < static_cast<std::size_t>(n); ++i) {
+      const double y0 = row + (static_cast<double>(i) + 0.5) * step;
+      down_x[i] = fixed(m.tx + shift - m.b * y0);
+      down_y[i] = fixed(m.ty + shift + m.a * y0);
+    }
     for (int next = 0; next < crop.width; next += lanes) {
       const int column = std::min(next, crop.width - lanes);  // the last ones may overlap those before
       Sums sums{hn::Zero(Numbers()), hn::Zero(Numbers())};
       Colours colours{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
-      for (int i = 0; i < n; ++i) {
-        const double y0 = row + (i + 0.5) * step;
-        auto x = position(across_x + column, -(m.b * y0), m.tx, shift);
-        auto y = position(across_y + column, m.a * y0, m.ty, shift);
+      for (std::size_t i = 0; i < static_cast<std::size_t>(n); ++i) {
+        auto x = hn::Add(hn::LoadU(Numbers(), across_x + column), hn::Set(Numbers(), down_x[i]));
+        auto y = hn::Add(hn::LoadU(Numbers(), across_y + column), hn::Set(Numbers(), down_y[i]));
         if (n == 1) {
           colours = bilinear(texels, x, y);
           break;
@@ -146,25 +151,43 @@ bool sampleInsideHere(const CropSamples& crop) {
 }
 
 // How many of them it has made.
+std::size_t addRowsHere(std::span<const std::uint8_t* const> rows, std::span<std::uint16_t> sums) {
+  const hn::CappedTag<std::uint16_t, 16> words;
+  const hn::Rebind<std::uint8_t, decltype(words)> bytes;
+  const std::size_t lanes = hn::Lanes(words);
+  std::size_t k = 0;
+  for (; k + lanes <= sums.size(); k += lanes) {
+    auto sum = hn::Zero(words);
+    for (const std::uint8_t* const row : rows) sum = hn::Add(sum, hn::PromoteTo(words, hn::LoadU(bytes, row + k)));
+    hn::StoreU(sum, words, sums.data() + k);
+  }
+  return k;
+}
+
+// How many of them it has made. Four pixels of both rows become two: first those at even places and those at odd ones
+// are taken apart, each colour in 16 bits.
 int halveRowsHere(const std::uint8_t* above, const std::uint8_t* below, int width, std::uint8_t* out) {
   using Bytes = hn::FixedTag<std::uint8_t, 16>;
   using Words = hn::Repartition<std::uint16_t, Bytes>;
-  using Halves = hn::FixedTag<std::uint8_t, 8>;
+  const Bytes bytes;
   const Words words;
-  const auto low = hn::Set(words, 0xFF), two = hn::Set(words, 2);
-  const auto mean = [&](auto a, auto b) HWY_ATTR {
-    const auto u = hn::BitCast(words, a), v = hn::BitCast(words, b);
-    const auto sum =
-        hn::Add(hn::Add(hn::And(u, low), hn::ShiftRight<8>(u)), hn::Add(hn::And(v, low), hn::ShiftRight<8>(v)));
-    const auto rounded = hn::ShiftRight<2>(hn::Add(sum, two));
-    return hn::DemoteTo(Halves(), hn::BitCast(hn::RebindToSigned<Words>(), rounded));
+  alignas(16) static constexpr std::uint8_t kEven[16] = {0, 255, 1, 255, 2,   255, 6,   255,
+                                                         7, 255, 8, 255, 255, 255, 255, 255};
+  alignas(16) static constexpr std::uint8_t kOdd[16] = {3,  255, 4,  255, 5,   255, 9,   255,
+                                                        10, 255, 11, 255, 255, 255, 255, 255};
+  const auto even = hn::Load(bytes, kEven), odd = hn::Load(bytes, kOdd);
+  const auto pairs = [&](const std::uint8_t* row) HWY_ATTR {
+    const auto pixels = hn::LoadU(bytes, row);
+    return hn::Add(hn::BitCast(words, hn::TableLookupBytesOr0(pixels, even)),
+                   hn::BitCast(words, hn::TableLookupBytesOr0(pixels, odd)));
   };
+  const hn::FixedTag<std::uint8_t, 8> halves;
   int x = 0;
-  for (; x + 8 <= width; x += 8) {
-    hn::Vec<Bytes> b0, g0, r0, b1, g1, r1;
-    hn::LoadInterleaved3(Bytes(), above + 6 * static_cast<std::size_t>(x), b0, g0, r0);
-    hn::LoadInterleaved3(Bytes(), below + 6 * static_cast<std::size_t>(x), b1, g1, r1);
-    hn::StoreInterleaved3(mean(b0, b1), mean(g0, g1), mean(r0, r1), Halves(), out + 3 * static_cast<std::size_t>(x));
+  for (; x + 4 <= width; x += 2) {  // reads 16 bytes, uses 12 of them; writes 8, of which the next ones replace 2
+    const std::size_t at = 6 * static_cast<std::size_t>(x);
+    const auto sum = hn::Add(hn::Add(pairs(above + at), pairs(below + at)), hn::Set(words, 2));
+    const auto mean = hn::BitCast(hn::RebindToSigned<Words>(), hn::ShiftRight<2>(sum));
+    hn::StoreU(hn::DemoteTo(halves, mean), halves, out + 3 * static_cast<std::size_t>(x));
   }
   return x;
 }
@@ -180,8 +203,17 @@ namespace volto::capture {
 
 HWY_EXPORT(sampleInsideHere);
 HWY_EXPORT(halveRowsHere);
+HWY_EXPORT(addRowsHere);
 
 bool sampleInside(const CropSamples& crop) { return HWY_DYNAMIC_DISPATCH(sampleInsideHere)(crop); }
+
+void addRows(std::span<const std::uint8_t* const> rows, std::span<std::uint16_t> sums) {
+  for (std::size_t k = HWY_DYNAMIC_DISPATCH(addRowsHere)(rows, sums); k < sums.size(); ++k) {
+    unsigned sum = 0;
+    for (const std::uint8_t* const row : rows) sum += row[k];
+    sums[k] = static_cast<std::uint16_t>(sum);
+  }
+}
 
 void halveRows(const std::uint8_t* above, const std::uint8_t* below, int width, std::uint8_t* out) {
   const int done = HWY_DYNAMIC_DISPATCH(halveRowsHere)(above, below, width, out);

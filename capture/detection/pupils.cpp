@@ -32,10 +32,10 @@ struct PlacesInARow {
   std::array<float, kPlaces> seen{}, bright{};
 };
 
-void addPlaces(const std::vector<float>& seen, const std::vector<float>& bright, int cy,
+void addPlaces(const std::vector<float>& seen, const std::vector<float>& bright, int cy, int first_row, int end_row,
                const std::vector<int>& half_widths, PlacesInARow& out) {
   const int reach = static_cast<int>(half_widths.size()) / 2;
-  for (int y = std::max(cy - reach, 0); y <= std::min(cy + reach, kHeight - 1); ++y) {
+  for (int y = std::max(cy - reach, first_row); y < std::min(cy + reach + 1, end_row); ++y) {
     const int half = half_widths[static_cast<std::size_t>(y - cy + reach)];
     const auto first = static_cast<std::size_t>(y * (kWidth + 1) + kLowX - half);
     const auto end = static_cast<std::size_t>(y * (kWidth + 1) + kLowX + half + 1);
@@ -115,24 +115,47 @@ Pupil PupilFinder::findOne(const Image& image, std::span<const std::array<float,
   const double opening = 0.5 * ((lid[5][1] - lid[1][1]) + (lid[4][1] - lid[2][1])) / kEye;
   if (!(opening > kLeastOpening)) return {};
 
-  Normalisation plain;
-  sampleCrop(image, patch, kWidth, kHeight, plain, false, grey_);
-  constexpr std::size_t kPlane = kWidth * kHeight;
-  for (std::size_t i = 0; i < kPlane; ++i)  // the red channel shows lids bright and the iris dark in every skin
-    grey_[i] = 0.2F * grey_[i] + 0.4F * grey_[i + kPlane] + 0.4F * grey_[i + 2 * kPlane];
+  // Only what lies between the lids counts, so only that part of the patch is taken from the image.
+  float top = kHeight, bottom = 0;
+  int first = kWidth, end = 0;
+  for (int x = 0; x < kWidth; ++x) {
+    const Column& column = columns[static_cast<std::size_t>(x)];
+    if (!(column.bottom + 0.5F > column.top - 0.5F)) continue;
+    first = std::min(first, x);
+    end = x + 1;
+    top = std::min(top, column.top - 1);
+    bottom = std::max(bottom, column.bottom + 1);
+  }
+  const int first_row = std::clamp(static_cast<int>(std::floor(top)), 0, kHeight);
+  const int end_row = std::clamp(static_cast<int>(std::ceil(bottom)), 0, kHeight);
+  if (first >= end || first_row >= end_row) return {};
+  const int across = end - first, down = end_row - first_row;
+  ImageFromCrop part = patch;
+  part.tx += patch.a * first - patch.b * first_row;
+  part.ty += patch.b * first + patch.a * first_row;
+  const std::size_t plane = static_cast<std::size_t>(across) * static_cast<std::size_t>(down);
+  sampleCrop(image, part, across, down, Normalisation{}, false, grey_);
+  for (std::size_t i = 0; i < plane; ++i)  // the red channel shows lids bright and the iris dark in every skin
+    grey_[i] = 0.2F * grey_[i] + 0.4F * grey_[i + plane] + 0.4F * grey_[i + 2 * plane];
   // Sums along each row, from its start up to each pixel: a disc is a few rows of pixels side by side.
-  for (int y = 0; y < kHeight; ++y) {
+  std::fill(seen_.begin(), seen_.end(), 0.0F);
+  std::fill(bright_.begin(), bright_.end(), 0.0F);
+  for (int y = first_row; y < end_row; ++y) {
+    const float* const grey = grey_.data() + static_cast<std::size_t>(y - first_row) * static_cast<std::size_t>(across);
+    float* const seen_sums = seen_.data() + static_cast<std::size_t>(y * (kWidth + 1)) + 1;
+    float* const bright_sums = bright_.data() + static_cast<std::size_t>(y * (kWidth + 1)) + 1;
     float seen = 0, bright = 0;
-    for (int x = 0; x < kWidth; ++x) {
+    for (int x = first; x < end; ++x) {
       const Column& column = columns[static_cast<std::size_t>(x)];
       const auto at = static_cast<float>(y) + 0.5F;
       const float open = std::clamp(std::min(at - column.top, column.bottom - at) + 0.5F, 0.0F, 1.0F);
       seen += open;
-      bright += open * grey_[static_cast<std::size_t>(y * kWidth + x)];
-      const auto i = static_cast<std::size_t>(y * (kWidth + 1) + x + 1);
-      seen_[i] = seen;
-      bright_[i] = bright;
+      bright += open * grey[x - first];
+      seen_sums[x] = seen;
+      bright_sums[x] = bright;
     }
+    std::fill(seen_sums + end, seen_sums + kWidth, seen);
+    std::fill(bright_sums + end, bright_sums + kWidth, bright);
   }
 
   struct Sum {
@@ -143,11 +166,11 @@ Pupil PupilFinder::findOne(const Image& image, std::span<const std::array<float,
     const int reach = static_cast<int>(half_widths.size()) / 2;
     for (int y = std::max(cy - reach, 0); y <= std::min(cy + reach, kHeight - 1); ++y) {
       const int half = half_widths[static_cast<std::size_t>(y - cy + reach)];
-      const int first = std::max(cx - half, 0), end = std::min(cx + half + 1, kWidth);
-      if (first >= end) continue;
+      const int from = std::max(cx - half, 0), to = std::min(cx + half + 1, kWidth);
+      if (from >= to) continue;
       const auto row = static_cast<std::size_t>(y * (kWidth + 1));
-      sum.seen += seen_[row + static_cast<std::size_t>(end)] - seen_[row + static_cast<std::size_t>(first)];
-      sum.bright += bright_[row + static_cast<std::size_t>(end)] - bright_[row + static_cast<std::size_t>(first)];
+      sum.seen += seen_[row + static_cast<std::size_t>(to)] - seen_[row + static_cast<std::size_t>(from)];
+      sum.bright += bright_[row + static_cast<std::size_t>(to)] - bright_[row + static_cast<std::size_t>(from)];
     }
     return sum;
   };
@@ -168,8 +191,8 @@ Pupil PupilFinder::findOne(const Image& image, std::span<const std::array<float,
   // All places of a row together: the same rows of the disc lie side by side there.
   for (int y = kLowY; y <= kHighY; y += 2) {
     PlacesInARow inside, all;
-    addPlaces(seen_, bright_, y, disc_, inside);
-    addPlaces(seen_, bright_, y, ring_, all);
+    addPlaces(seen_, bright_, y, first_row, end_row, disc_, inside);
+    addPlaces(seen_, bright_, y, first_row, end_row, ring_, all);
     for (std::size_t i = 0; i < kPlaces; i += 2)
       consider(contrastOf({inside.seen[i], inside.bright[i]}, {all.seen[i], all.bright[i]}),
                kLowX + static_cast<int>(i), y);
