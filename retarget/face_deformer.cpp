@@ -4,6 +4,7 @@
 #include <string>
 
 #include "retarget/eyes.h"
+#include "retarget/packed_corrections.h"
 #include "rig/pose.h"
 
 namespace volto::retarget {
@@ -13,14 +14,19 @@ struct FaceDeformer::State {
   rig::Rig layers;  // what rig/pose.h reads, and nothing else
   Deformer deformer;
   Eyes eyes;
+  PackedCorrections corrections;
 
   explicit State(const rig::Rig& rig)
-      : neutral(rig::neutralPositions(rig)), deformer(rig.deformation, neutral), eyes(rig) {
-    rig::checkPoseData(rig);
+      : neutral(rig::neutralPositions(checked(rig))), deformer(rig.deformation, neutral), eyes(rig), corrections(rig) {
     layers.blendshapes = rig.blendshapes;
-    layers.combinations = rig.combinations;
+    for (rig::Blendshape& shape : layers.blendshapes) shape.correction = {};  // packed above
     layers.part_motions = rig.part_motions;
     layers.contacts = rig.contacts;
+  }
+
+  static const rig::Rig& checked(const rig::Rig& rig) {
+    rig::checkPoseData(rig);
+    return rig;
   }
 
   void checkWeights(std::size_t count) const {
@@ -44,7 +50,9 @@ void FaceDeformer::deform(const MeshMaskDisplacement& mask, std::span<const floa
   s.checkWeights(weights.size());
   s.deformer.deform(mask, out);
   const bool gaze_known = gaze.confidence > 0.0F;
-  rig::addToPose(s.layers, weights, !gaze_known, s.neutral, out);
+  rig::putPartsBack(s.layers, s.neutral, out);
+  s.corrections.addTo(weights, out);
+  rig::turnParts(s.layers, weights, !gaze_known, out);
   rig::resolveContacts(s.layers.contacts, s.neutral, out);
   if (gaze_known) s.eyes.turn(gaze, out);
 }

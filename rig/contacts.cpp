@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "rig/unfold_rounds.h"
 #include "rig/vec3.h"
@@ -103,7 +102,9 @@ void giveWay(const SlitContact& slit, const BallContact* ball, float by, Vec3& p
   p = p + by * slit.up;
 }
 
-void partSides(const SlitContact& slit, const BallContact* ball, std::span<Vec3> positions) {
+// Whether something was moved.
+bool partSides(const SlitContact& slit, const BallContact* ball, std::span<Vec3> positions) {
+  bool moved = false;
   const Columns columns = measureColumns(slit, positions);
   for (std::size_t i = 0; i < slit.vertex.size(); ++i) {
     Vec3& p = positions[slit.vertex[i]];
@@ -113,27 +114,28 @@ void partSides(const SlitContact& slit, const BallContact* ball, std::span<Vec3>
     const auto between = [&](const auto& of) { return of[a] + t * (of[b] - of[a]); };
     const float missing = between(columns.missing);
     const float give = missing * (share > 0 ? slit.upper_share : 1 - slit.upper_share);
-    if (missing > 0) giveWay(slit, ball, share * give, p);
+    if (missing > 0) giveWay(slit, ball, share * give, p), moved = true;
     // Whatever lies beyond the other side's margin by more than it did at rest.
     if (share > 0) {
       const float other = between(columns.lower) - (1 - slit.upper_share) * missing;
       const float beyond = other + slit.reach[i] - dot(slit.up, p);
-      if (beyond > 0) giveWay(slit, ball, share * beyond, p);
+      if (beyond > 0) giveWay(slit, ball, share * beyond, p), moved = true;
     } else {
       const float other = between(columns.upper) + slit.upper_share * missing;
       const float beyond = dot(slit.up, p) - (other - slit.reach[i]);
-      if (beyond > 0) giveWay(slit, ball, share * beyond, p);
+      if (beyond > 0) giveWay(slit, ball, share * beyond, p), moved = true;
     }
   }
+  return moved;
 }
 
 // Triangles that were nearly turned over get back what they need; the lids stay out of the balls meanwhile.
 void unfold(const Contacts& contacts, std::span<Vec3> positions) {
   constexpr int kMostRounds = 24, kBallsEvery = 4;
-  if (contacts.folds.empty() || unfoldOnce(contacts.folds, contacts.folds.watched, positions) == 0) return;
+  if (contacts.folds.empty()) return;
   std::array<TouchedVertices, 2> touched;
-  touched[0].addAll();
-  std::optional<TriangleBlocks> blocks;
+  if (unfoldFirst(contacts.folds, contacts.folds.watched, touched[0], positions) == 0) return;
+  const TriangleBlocks blocks(contacts.folds);
   for (int round = 1; round < kMostRounds; ++round) {
     TouchedVertices &reach = touched[static_cast<std::size_t>(round + 1) % 2],
                     &now = touched[static_cast<std::size_t>(round) % 2];
@@ -141,8 +143,7 @@ void unfold(const Contacts& contacts, std::span<Vec3> positions) {
     if (round % kBallsEvery == 0)
       for (const BallContact& ball : contacts.balls) keepOnBall(ball, false, positions, &now);
     reach.addAll(now);
-    if (unfoldAround(contacts.folds, blocks ? &*blocks : nullptr, reach, now, positions) == 0) return;
-    if (!blocks) blocks.emplace(contacts.folds);
+    if (unfoldAround(contacts.folds, blocks, reach, now, positions) == 0) return;
   }
 }
 
@@ -184,8 +185,10 @@ std::array<float, kMaxSlitColumns> slitGaps(const SlitContact& slit, std::span<c
 
 void resolveContacts(const Contacts& contacts, std::span<const Vec3> neutral, std::span<Vec3> positions) {
   for (const BallContact& ball : contacts.balls) keepOnBall(ball, true, positions);
-  for (const SlitContact& slit : contacts.slits) partSides(slit, ballOf(contacts, slit.ball), positions);
-  if (!contacts.slits.empty())
+  bool moved = false;  // beside a ball
+  for (const SlitContact& slit : contacts.slits)
+    if (partSides(slit, ballOf(contacts, slit.ball), positions)) moved = moved || slit.ball >= 0;
+  if (moved)
     for (const BallContact& ball : contacts.balls) keepOnBall(ball, false, positions);
   unfold(contacts, positions);
   for (const Rider& rider : contacts.riders) ride(rider, ballOf(contacts, rider.ball), neutral, positions);

@@ -50,14 +50,21 @@ void moveCopies(const FoldGuard& guard, std::span<Vec3> positions) {
 
 }  // namespace
 
-std::size_t unfoldOnce(const FoldGuard& guard, std::size_t count, std::span<Vec3> positions) {
+std::size_t unfoldFirst(const FoldGuard& guard, std::size_t count, TouchedVertices& now, std::span<Vec3> positions) {
   std::size_t lacking = 0;
   for (std::size_t i = 0; i < count; ++i) {
     bool moved = false;
     lacking += bringBack(guard, i, positions, moved) ? 1 : 0;
+    if (!moved) continue;
+    for (const std::uint32_t v : guard.triangle[i]) now.add(v);
   }
   if (lacking > 0) moveCopies(guard, positions);
   return lacking;
+}
+
+std::size_t unfoldOnce(const FoldGuard& guard, std::size_t count, std::span<Vec3> positions) {
+  TouchedVertices ignored;
+  return unfoldFirst(guard, count, ignored, positions);
 }
 
 TriangleBlocks::TriangleBlocks(const FoldGuard& guard)
@@ -66,13 +73,13 @@ TriangleBlocks::TriangleBlocks(const FoldGuard& guard)
     for (const std::uint32_t v : guard.triangle[i]) groups_[i / size_] |= TouchedVertices::groupOf(v);
 }
 
-std::size_t unfoldAround(const FoldGuard& guard, const TriangleBlocks* blocks, TouchedVertices& reach,
+std::size_t unfoldAround(const FoldGuard& guard, const TriangleBlocks& blocks, TouchedVertices& reach,
                          TouchedVertices& now, std::span<Vec3> positions) {
   std::size_t lacking = 0;
-  const std::size_t count = guard.triangle.size(), size = blocks != nullptr ? blocks->size() : count;
+  const std::size_t count = guard.triangle.size(), size = blocks.size();
   for (std::size_t first = 0, block = 0; first < count; first += size, ++block) {
     // Where no triangle is reached, none is moved that could reach another one of the block.
-    if (blocks != nullptr && (blocks->groups(block) & reach.groups()) == 0) continue;
+    if ((blocks.groups(block) & reach.groups()) == 0) continue;
     const std::size_t end = std::min(first + size, count);
     for (std::size_t i = first; i < end; ++i) {
       if (!reach.hasAny(guard.triangle[i])) continue;

@@ -8,9 +8,6 @@
 namespace volto::rig {
 namespace {
 
-// A weight below this moves nothing that could be seen.
-constexpr float kNoWeight = 1e-6F;
-
 // N vertices that follow each other: their coordinates lie side by side.
 template <std::size_t N>
 void addSideBySide(const float* __restrict displacement, float weight, float* __restrict positions) {
@@ -32,17 +29,6 @@ void add(const SparseDisplacement& correction, float weight, std::span<Position>
       ++i;
     }
   }
-}
-
-float weightOf(const Combination& combination, std::span<const float> weights) {
-  if (combination.rule == Combination::Rule::excess)
-    return std::max(0.0F, weights[combination.drivers[0].shape] - weights[combination.drivers[1].shape]);
-  float product = 1;
-  for (const Combination::Driver& driver : combination.drivers) {
-    const float w = weights[driver.shape];
-    product *= driver.halfway ? std::max(0.0F, 4 * w * (1 - w)) : w;
-  }
-  return product;
 }
 
 // Rotation minus one, of axis times angle.
@@ -205,17 +191,36 @@ void poseByOperator(const Rig& rig, std::span<const float> weights, std::span<co
   }
 }
 
-void addToPose(const Rig& rig, std::span<const float> weights, bool turn_eyes, std::span<const Position> neutral,
-               std::span<Position> positions) {
+float weightOf(const Combination& combination, std::span<const float> weights) {
+  if (combination.rule == Combination::Rule::excess)
+    return std::max(0.0F, weights[combination.drivers[0].shape] - weights[combination.drivers[1].shape]);
+  float product = 1;
+  for (const Combination::Driver& driver : combination.drivers) {
+    const float w = weights[driver.shape];
+    product *= driver.halfway ? std::max(0.0F, 4 * w * (1 - w)) : w;
+  }
+  return product;
+}
+
+void putPartsBack(const Rig& rig, std::span<const Position> neutral, std::span<Position> positions) {
   for (const PartMotion& motion : rig.part_motions)
     for (const std::uint32_t v : motion.vertices) positions[v] = neutral[v];
+}
+
+void turnParts(const Rig& rig, std::span<const float> weights, bool turn_eyes, std::span<Position> positions) {
+  for (const PartMotion& motion : rig.part_motions)
+    if (turn_eyes || !isEye(motion)) turnPart(motion, weights, positions);
+}
+
+void addToPose(const Rig& rig, std::span<const float> weights, bool turn_eyes, std::span<const Position> neutral,
+               std::span<Position> positions) {
+  putPartsBack(rig, neutral, positions);
   for (std::size_t k = 0; k < rig.blendshapes.size(); ++k)
     if (std::abs(weights[k]) > kNoWeight) add(rig.blendshapes[k].correction, weights[k], positions);
   for (const Combination& combination : rig.combinations)
     if (const float w = weightOf(combination, weights); std::abs(w) > kNoWeight)
       add(combination.correction, w, positions);
-  for (const PartMotion& motion : rig.part_motions)
-    if (turn_eyes || !isEye(motion)) turnPart(motion, weights, positions);
+  turnParts(rig, weights, turn_eyes, positions);
 }
 
 void pose(const Rig& rig, std::span<const float> weights, std::span<const Position> neutral,

@@ -12,6 +12,9 @@ namespace volto::rig {
 
 using Position = std::array<float, 3>;
 
+// A weight below this moves nothing that could be seen.
+inline constexpr float kNoWeight = 1e-6F;
+
 std::vector<Position> inSinglePrecision(const VertexPositions& positions);
 std::vector<Position> neutralPositions(const Rig& rig);
 
@@ -25,6 +28,12 @@ void poseByOperator(const Rig& rig, std::span<const float> weights, std::span<co
 // rig alone.
 void addToPose(const Rig& rig, std::span<const float> weights, bool turn_eyes, std::span<const Position> neutral,
                std::span<Position> positions);
+
+// The parts of addToPose(), for those who add corrections in another way between them: parts at rest; the weight of a
+// combination; parts turned.
+void putPartsBack(const Rig& rig, std::span<const Position> neutral, std::span<Position> positions);
+float weightOf(const Combination& combination, std::span<const float> weights);
+void turnParts(const Rig& rig, std::span<const float> weights, bool turn_eyes, std::span<Position> positions);
 
 // All of it: operator, parts, corrections, contacts.
 void pose(const Rig& rig, std::span<const float> weights, std::span<const Position> neutral,

@@ -1,5 +1,5 @@
-// The rounds after the first one of bringing back folded triangles (rig/fold_guard.h): only around what the round
-// before has moved. Internal to rig/.
+// The rounds of bringing back folded triangles (rig/fold_guard.h): the first one over all that are watched, those after
+// it only around what the round before has moved. Internal to rig/.
 #pragma once
 
 #include <array>
@@ -14,10 +14,6 @@ namespace volto::rig {
 // A set of vertices in two kilobytes, whatever their number: says yes to all that were added, and to a few others.
 class TouchedVertices {
  public:
-  void addAll() {
-    bits_.fill(~std::uint64_t{0});
-    groups_ = ~std::uint64_t{0};
-  }
   void addAll(const TouchedVertices& other) {
     for (std::size_t i = 0; i < kWords; ++i) bits_[i] |= other.bits_[i];
     groups_ |= other.groups_;
@@ -58,10 +54,13 @@ class TriangleBlocks {
   std::array<std::uint64_t, kMostBlocks> groups_{};
 };
 
+// As unfoldOnce(); `now` gains what was moved.
+std::size_t unfoldFirst(const FoldGuard& guard, std::size_t count, TouchedVertices& now,
+                        std::span<std::array<float, 3>> positions);
+
 // One round over the triangles with a vertex in `reach`: what the round before has moved, to which come those moved in
-// this one. `now` gains these too. `blocks`: of this guard, or null to look at every triangle. Returns how many lacked
-// something.
-std::size_t unfoldAround(const FoldGuard& guard, const TriangleBlocks* blocks, TouchedVertices& reach,
+// this one. `now` gains these too. `blocks`: of this guard. Returns how many lacked something.
+std::size_t unfoldAround(const FoldGuard& guard, const TriangleBlocks& blocks, TouchedVertices& reach,
                          TouchedVertices& now, std::span<std::array<float, 3>> positions);
 
 }  // namespace volto::rig

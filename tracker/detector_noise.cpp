@@ -15,6 +15,8 @@ Settings settingsFor(const TrackerOptions& options) {
   // Against 64 points that are off by more than a millimetre, and not independently, what people do counts for more:
   // with the constants for measured landmarks the shapes of both sides fight each other to explain the detector.
   settings.point_noise_mm = 1.2;
+  // What a detector draws fits less well, and along one linearisation three steps do not settle on a head that turns.
+  settings.linear_within_rad = 0.006;
   settings.correlation = 0.9;
   settings.habit_frames = 60;
   settings.expression_memory_s = 0.1;  // or a blink is over before it is believed

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
@@ -35,10 +36,16 @@ void moveHead(const Eigen::Matrix<double, 6, 1>& step, ViewPose& pose) {
   }
 }
 
+// For small angles, radians.
+double turnBetween(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) { return (a - b).norm() / std::numbers::sqrt2; }
+
 }  // namespace
 
 FrameFit::FrameFit(const MeasuredPoints& points, const Settings& settings)
-    : points_(points), variance_(settings.point_noise_mm * settings.point_noise_mm), outlier_mm_(settings.outlier_mm) {
+    : points_(points),
+      variance_(settings.point_noise_mm * settings.point_noise_mm),
+      outlier_mm_(settings.outlier_mm),
+      linear_within_rad_(settings.linear_within_rad) {
   const int size = points.count();
   neutral_ = position_ = gradient_ = residual_ = Eigen::VectorXd::Zero(3 * size);
   for (auto& v : moved_) v.setZero(size);
@@ -151,9 +158,18 @@ bool FrameFit::improve(const Observation& seen, const WeightPrior& prior, int it
   ViewPose tried_pose = pose;
   ShapeVector tried = weights;
   if (!evaluate(seen, tried_pose, tried)) return false;
-  if (kept == nullptr) composeNormalMatrices(seen);
   const NormalMatrices& normal = kept != nullptr ? *kept : normal_;
-  posterior_ = normal.information + prior.precision;
+  Eigen::Matrix3d linearised_at = pose.rotation;
+  const auto linearise = [&] {
+    linearised_at = tried_pose.rotation;
+    composeNormalMatrices(seen);
+    posterior_ = normal_.information + prior.precision;
+  };
+  if (kept == nullptr) {
+    linearise();
+  } else {
+    posterior_ = kept->information + prior.precision;
+  }
   const auto costOf = [&](const ShapeVector& w) {
     const ShapeVector off = w - prior.mean;
     return cost_ + 0.5 * off.dot(prior.precision * off);
@@ -192,7 +208,9 @@ bool FrameFit::improve(const Observation& seen, const WeightPrior& prior, int it
     }
     if (now <= kRunsAway * cost) {
       cost = std::min(cost, now);
-      linearised_here = false;
+      linearised_here =
+          iteration + 1 < iterations && turnBetween(linearised_at, tried_pose.rotation) > linear_within_rad_;
+      if (linearised_here) linearise();
       continue;
     }
     // Steps along an old linearisation may run away (a face far from rest, a pose from nothing): back, and anew.
@@ -200,8 +218,7 @@ bool FrameFit::improve(const Observation& seen, const WeightPrior& prior, int it
     tried_pose = pose_before;
     if (!evaluate(seen, tried_pose, tried)) return false;
     if (linearised_here) break;
-    composeNormalMatrices(seen);
-    posterior_ = normal.information + prior.precision;
+    linearise();
     linearised_here = true;
   }
   if (!tried.allFinite() || !tried_pose.rotation.allFinite() || !tried_pose.translation.allFinite()) return false;

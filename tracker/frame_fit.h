@@ -2,9 +2,10 @@
 // Internal to the tracker.
 //
 // Gauss-Newton on pose and weights together: the pose is eliminated (Schur complement), the weights are found by
-// coordinate descent within their bounds (warm start). The normal matrix is made once per frame, residuals and
-// gradients in every iteration; a step that makes the fit worse is taken back, and the matrix made anew. Outliers have
-// their residual cut (the modified residuals of Huber and Dutter), which leaves the matrix alone.
+// coordinate descent within their bounds (warm start). The normal matrix is made once per frame and again where the head
+// has turned since (Settings::linear_within_rad), residuals and gradients in every iteration; a step that makes the fit
+// worse is taken back, and the matrix made anew. Outliers have their residual cut (the modified residuals of Huber and
+// Dutter), which leaves the matrix alone.
 #pragma once
 
 #include <vector>
@@ -86,7 +87,7 @@ class FrameFit {
   void exactPoseStep(const Observation& seen, ViewPose& pose);
 
   MeasuredPoints points_;
-  double variance_, outlier_mm_;
+  double variance_, outlier_mm_, linear_within_rad_;
   const ExpressionBasis* basis_ = nullptr;
   Eigen::VectorXd neutral_;   // 3P
   Eigen::VectorXd position_;  // 3P

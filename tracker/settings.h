@@ -9,6 +9,9 @@ struct Settings {
   double point_noise_mm = 0.4;  // deviation of a landmark from the model: detector noise and what the model cannot say
   double outlier_mm = 4.0;      // a residual beyond this pulls no harder than this (Huber)
 
+  // --- One frame
+  double linear_within_rad = 1e9;  // the fit is linearised anew when the head has turned by more than this since
+
   // --- The face at rest: mean face plus a smooth warp (Gaussian process over the mask, nearly symmetric)
   double shape_deviation_mm = 1.6;  // how far a face differs from the mean, at the mean's size
   double shape_reach_mm = 15.0;     // over what distance neighbours differ together

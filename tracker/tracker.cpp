@@ -181,11 +181,7 @@ bool Tracker::State::track(double dt_s) {
   prior.precision = precision / (1 - keep * keep);
   prior.mean = usual + keep * (weights - usual);
   const int iterations = tracking ? kIterations : 3 * kIterations;
-  // What a detector draws fits less well, and along one linearisation three steps do not settle on a head that turns.
-  const int linearisations = options.from_pixels ? iterations : 1;
-  bool good = true;
-  for (int i = 0; i < linearisations && good; ++i)
-    good = p.fit.improve(p.seen, prior, iterations / linearisations, kSweeps, pose, weights);
+  bool good = p.fit.improve(p.seen, prior, iterations, kSweeps, pose, weights);
   if (tracking && (!good || p.fit.rms_mm() > kPoorFit_mm)) {
     const double rms = good ? p.fit.rms_mm() : 1e9;
     ViewPose other_pose;
