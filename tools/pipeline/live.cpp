@@ -34,6 +34,7 @@ struct Found {
   LandmarkFrame landmarks;
   capture::Image image;
   std::int64_t t_shown_ns = 0, arrived_ns = 0;
+  std::int64_t worked_ns = 0;  // by the stages so far, without the networks and without waiting
 };
 
 struct Shown {
@@ -41,7 +42,7 @@ struct Shown {
   capture::Image image;
   MaskFrame mask;
   AvatarFrame avatar;
-  std::int64_t t_shown_ns = 0, arrived_ns = 0;
+  std::int64_t t_shown_ns = 0, arrived_ns = 0, worked_ns = 0;
 };
 
 // What a stage has done; read by others.
@@ -130,7 +131,7 @@ struct Live::State {
   std::vector<std::thread> threads;
   std::int64_t start_ns = 0;
 
-  Meter capture_meter, detection_meter, tracker_meter, retarget_meter, learning_meter, publish_meter, whole_meter;
+  Meter capture_meter, detection_meter, tracker_meter, retarget_meter, learning_meter, publish_meter, work_meter, whole_meter;
 
   // The tracker thread's own.
   std::vector<LandmarkFrame> rest;
@@ -219,12 +220,14 @@ void Live::State::detect() {
     const auto taken = captured.take(in, kPatience);
     if (taken == Slot<Captured>::Taken::closed) break;
     if (taken == Slot<Captured>::Taken::nothing) continue;
-    const std::int64_t before = monotonicNow();
+    const std::int64_t before = monotonicNow(), networks_before = input.finder->counters().networks_ns;
     input.finder->push(in.image, out.landmarks);
     out.t_shown_ns = in.t_shown_ns;
     out.arrived_ns = in.arrived_ns;
     if (options.keep_images) std::swap(in.image, out.image);
-    detection_meter.add(monotonicNow() - before);
+    const std::int64_t took = monotonicNow() - before;
+    detection_meter.add(took);
+    out.worked_ns = took - (input.finder->counters().networks_ns - networks_before);
     {
       const std::lock_guard lock(mutex);
       finder_counters = input.finder->counters();
@@ -242,6 +245,7 @@ void Live::State::beSilent(Found& item) {
   item.landmarks.point_confidence.clear();
   item.landmarks.confidence = 0;
   item.landmarks.t_capture_ns = item.t_shown_ns = item.arrived_ns = monotonicNow();
+  item.worked_ns = 0;
 }
 
 void Live::State::calibrate(const LandmarkFrame& landmarks) {
@@ -300,6 +304,7 @@ void Live::State::track() {
     if (options.keep_images) std::swap(out.image, in.image);
     out.t_shown_ns = in.t_shown_ns;
     out.arrived_ns = in.arrived_ns;
+    out.worked_ns = in.worked_ns + path.retargetedAt() - before;
     if (!shown.put(out)) break;
     const std::int64_t gone = monotonicNow();
     path.learn();
@@ -333,6 +338,7 @@ void Live::State::publish() {
     publisher.flush();
     const std::int64_t sent = monotonicNow();
     publish_meter.add(sent - before);
+    if (item.worked_ns > 0 && input.images) work_meter.add(item.worked_ns + sent - before);
     whole_meter.add(sent - item.arrived_ns);
     ++frames_sent;
     if (options.look)
@@ -360,6 +366,7 @@ LiveReport Live::State::makeReport() const {
   add("retarget", retarget_meter, 0, 0);
   add("learning", learning_meter, 0, 0);
   add("publish", publish_meter, shown.replaced(), shown.waiting());
+  if (input.images) add("all but networks", work_meter, 0, 0);
   add("arrival to sent", whole_meter, 0, 0);
   out.source = source;
   out.source_state = source_state;
