@@ -201,7 +201,8 @@ class VideoSource final : public ImageSource {
     const int probed = av_probe_input_buffer2(bytes, &kind, url.c_str(), nullptr, 0, 0);
     avio_closep(&bytes);
     if (probed < 0 || kind == nullptr) return;
-    constexpr std::array<std::string_view, 7> kLists = {"hls", "dash", "webm_dash_manifest", "concat", "imf", "sdp", "rtsp"};
+    constexpr std::array<std::string_view, 7> kLists = {"hls", "dash", "webm_dash_manifest", "concat", "imf",
+                                                        "sdp", "rtsp"};
     if (std::find(kLists.begin(), kLists.end(), kind->name) != kLists.end())
       throw InputError(path_ + ": is a list of other files (" + kind->name + "), not a video; give the video itself");
   }
@@ -302,9 +303,17 @@ class VideoSource final : public ImageSource {
     if (!scaler_) return false;
     Image& upright = turn_ == 0 ? out : lying_;
     upright.resize(f.width, f.height);
-    std::uint8_t* const rows[4] = {upright.bgr.data(), nullptr, nullptr, nullptr};
-    const int strides[4] = {3 * f.width, 0, 0, 0};
+    // FFmpeg's converters write whole vectors, at the end of a row beyond it: after the last row into what is not ours.
+    constexpr int kVector = 32;  // pixels
+    const std::size_t row = 3 * static_cast<std::size_t>(f.width);
+    const bool fits = f.width % kVector == 0;
+    const std::size_t stride = fits ? row : 3 * static_cast<std::size_t>((f.width / kVector + 1) * kVector);
+    if (!fits) padded_.resize(stride * static_cast<std::size_t>(f.height));
+    std::uint8_t* const rows[4] = {fits ? upright.bgr.data() : padded_.data(), nullptr, nullptr, nullptr};
+    const int strides[4] = {static_cast<int>(stride), 0, 0, 0};
     if (sws_scale(scaler_.get(), f.data, f.linesize, 0, f.height, rows, strides) != f.height) return false;
+    for (std::size_t y = 0; !fits && y < static_cast<std::size_t>(f.height); ++y)
+      std::copy_n(padded_.data() + y * stride, row, upright.bgr.data() + y * row);
     if (turn_ != 0) turnUpright(lying_, out);
     out.t_capture_ns = timeOf(f);
     out.capture_seq = ++seq_;
@@ -359,6 +368,7 @@ class VideoSource final : public ImageSource {
   std::uint64_t seq_ = 0;
   bool flushed_ = false;
 
+  std::vector<std::uint8_t> padded_;  // a picture whose rows have room after them
   Image first_, lying_, ahead_;
   bool have_first_ = false, have_ahead_ = false;
   bool started_ = false;

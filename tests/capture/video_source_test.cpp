@@ -68,6 +68,35 @@ class Sequence : public ::testing::Test {
   test::TemporaryDir dir;
 };
 
+// Grey, 4:2:0, as cameras and videos have it.
+void writeY4m(const std::filesystem::path& path, int width, int height, int pictures) {
+  std::ofstream file(path, std::ios::binary);
+  file << "YUV4MPEG2 W" << width << " H" << height << " F25:1 Ip A1:1 C420jpeg\n";
+  for (int i = 0; i < pictures; ++i) {
+    file << "FRAME\n" << std::string(static_cast<std::size_t>(width * height), static_cast<char>(90));
+    file << std::string(static_cast<std::size_t>(2 * ((width + 1) / 2) * ((height + 1) / 2)), static_cast<char>(128));
+  }
+}
+
+TEST(VideoSource, APictureOfAnyWidthIsWrittenToItsLastByteAndNotBeyond) {
+  test::TemporaryDir dir;
+  for (const int width : {300, 302, 317, 33, 32, 20}) {
+    writeY4m(dir / "v.y4m", width, 6, 2);
+    const auto source = openVideo(dir / "v.y4m");
+    const std::size_t bytes = static_cast<std::size_t>(width) * 6 * 3;
+    constexpr std::size_t kBeyond = 64;
+    Image image;
+    image.bgr.assign(bytes + kBeyond, 0xA5);  // it keeps this memory
+    ASSERT_EQ(source->next(image, 1s), Next::frame);
+    ASSERT_EQ(image.bgr.size(), bytes) << width;
+    for (const std::uint8_t value : image.bgr) ASSERT_NEAR(value, 90, 12) << width;
+    image.bgr.resize(bytes);
+    const std::uint8_t* const end = image.bgr.data() + bytes;
+    ASSERT_GE(image.bgr.capacity(), bytes + kBeyond);
+    for (std::size_t i = 0; i < kBeyond; ++i) ASSERT_EQ(end[i], 0xA5) << width << " wide, byte " << i << " after it";
+  }
+}
+
 TEST_F(Sequence, APatternGivesItsPicturesAtTheRateThatWasSaid) {
   const auto source = openVideo(dir / "f%03d.ppm", {.sequence_rate_hz = 10});
   const Watched seen = watch(*source);
