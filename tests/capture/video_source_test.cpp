@@ -85,8 +85,9 @@ TEST(VideoSource, APictureOfAnyWidthIsWrittenToItsLastByteAndNotBeyond) {
     const auto source = openVideo(dir / "v.y4m");
     const std::size_t bytes = static_cast<std::size_t>(width) * 6 * 3;
     constexpr std::size_t kBeyond = 64;
-    Image image;
+    Image first, image;
     image.bgr.assign(bytes + kBeyond, 0xA5);  // it keeps this memory
+    ASSERT_EQ(source->next(first, 1s), Next::frame);
     ASSERT_EQ(source->next(image, 1s), Next::frame);
     ASSERT_EQ(image.bgr.size(), bytes) << width;
     for (const std::uint8_t value : image.bgr) ASSERT_NEAR(value, 90, 12) << width;
