@@ -5,7 +5,16 @@
 #include <span>
 #include <string_view>
 
+#include <gtest/gtest.h>
+
 #include "rig/fitting/fit_points.h"
+
+// Ten times slower there, and seen often enough in the other tests.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define VOLTO_PLAIN_BUILD_ONLY() GTEST_SKIP() << "SKIPPED: measured in the plain build"
+#else
+#define VOLTO_PLAIN_BUILD_ONLY() static_cast<void>(0)
+#endif
 
 namespace volto::rig::test {
 

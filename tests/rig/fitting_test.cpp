@@ -13,13 +13,6 @@ namespace {
 
 using test::KnownHead;
 
-// Ten times slower there, and seen often enough in the other tests.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define VOLTO_PLAIN_BUILD_ONLY() GTEST_SKIP() << "SKIPPED: measured in the plain build"
-#else
-#define VOLTO_PLAIN_BUILD_ONLY() static_cast<void>(0)
-#endif
-
 class FitPoints : public testing::Test {
  protected:
   static void SetUpTestSuite() {

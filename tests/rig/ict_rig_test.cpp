@@ -93,25 +93,6 @@ TEST_F(IctHead, OpeningJawTakesLowerTeethAlongAndLeavesUpperOnes) {
   EXPECT_LT(std::sqrt(error / motion), 0.35);
 }
 
-// Upper and lower lashes and the wet edge of an eye are one part there; half of its own rows follow neither lid.
-TEST_F(IctHead, LashesOfBothLidsInOnePartRideOnTheMargins) {
-  const std::string points = (test::sourceDir() / "tests/rig/ict_feature_points.json").string();
-  const Rig rig = buildRig(readMesh(ict_ / "person_a.obj"), parseFeaturePoints(textOf(points), points));
-  std::set<std::uint32_t> margins;
-  for (const SlitContact& slit : rig.contacts.slits)
-    for (const auto* side : {&slit.upper, &slit.lower})
-      for (const SlitContact::Sample& sample : *side) margins.insert({sample.first, sample.second});
-  constexpr std::uint32_t kFirstLash = 25351, kPastLashes = 26719;  // of the library's mesh
-  std::size_t riding = 0;
-  for (const Rider& rider : rig.contacts.riders) {
-    if (rider.vertex < kFirstLash || rider.vertex >= kPastLashes) continue;
-    ++riding;
-    EXPECT_GE(rider.ball, 0) << rider.vertex;
-    for (std::size_t k = 0; k < 2; ++k) EXPECT_TRUE(margins.contains(rider.anchor[k])) << rider.vertex;
-  }
-  EXPECT_EQ(riding, kPastLashes - kFirstLash);
-}
-
 TEST_F(IctHead, EyeballsAreFoundOnBothSides) {
   double left = 0, right = 0;
   for (const RigidPart& part : rig_->rigid_parts) {
