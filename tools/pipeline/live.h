@@ -62,8 +62,8 @@ struct StageReport {
 };
 
 struct LiveReport {
-  // capture, detection, tracker, retarget, learning (the tracker's, when the frame has gone on already), publish, and
-  // capture to sent as a whole
+  // capture, detection, tracker, retarget, learning (the tracker's, when the frame has gone on already), publish; of
+  // pictures all of these but capture, learning and the networks, frame by frame; and capture to sent as a whole
   std::vector<StageReport> stages;
   capture::SourceCounters source;
   capture::SourceState source_state = capture::SourceState::no_signal;
