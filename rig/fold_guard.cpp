@@ -62,11 +62,6 @@ std::size_t unfoldFirst(const FoldGuard& guard, std::size_t count, TouchedVertic
   return lacking;
 }
 
-std::size_t unfoldOnce(const FoldGuard& guard, std::size_t count, std::span<Vec3> positions) {
-  TouchedVertices ignored;
-  return unfoldFirst(guard, count, ignored, positions);
-}
-
 TriangleBlocks::TriangleBlocks(const FoldGuard& guard)
     : size_(std::max<std::size_t>(8, (guard.triangle.size() + kMostBlocks - 1) / kMostBlocks)) {
   for (std::size_t i = 0; i < guard.triangle.size(); ++i)

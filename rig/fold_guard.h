@@ -24,10 +24,6 @@ struct FoldGuard {
   bool empty() const { return triangle.empty(); }
 };
 
-// One round over the first `count` triangles: each that lacks something gets three times `least`. Returns how many
-// did; 0: nothing was touched.
-std::size_t unfoldOnce(const FoldGuard& guard, std::size_t count, std::span<std::array<float, 3>> positions);
-
 struct Rig;
 struct Skin;
 

@@ -54,7 +54,8 @@ class TriangleBlocks {
   std::array<std::uint64_t, kMostBlocks> groups_{};
 };
 
-// As unfoldOnce(); `now` gains what was moved.
+// One round over the first `count` triangles: each that lacks something gets three times `least`. `now` gains what was
+// moved. Returns how many lacked something; 0: nothing was touched.
 std::size_t unfoldFirst(const FoldGuard& guard, std::size_t count, TouchedVertices& now,
                         std::span<std::array<float, 3>> positions);
 
