@@ -54,35 +54,54 @@ std::size_t Publisher::setCharacter(const Character& character) {
   return number;
 }
 
-void Publisher::push(const AvatarFrame& frame, std::size_t character) {
-  State& s = *state_;
+bool Publisher::State::enqueue(const AvatarFrame& frame, std::size_t character) {
   Stream* weights = nullptr;
   Stream* mesh = nullptr;
   std::uint64_t id = 0;
   {
-    const std::lock_guard guard(s.mutex);
-    if (character >= s.characters.size() || frame.weights.size() != s.characters[character].entry->blendshapes ||
-        (!frame.vertices.empty() && frame.vertices.size() != s.characters[character].entry->vertices)) {
-      ++s.counters.refused;
-      return;
+    const std::lock_guard guard(mutex);
+    if (character >= characters.size() || frame.weights.size() != characters[character].entry->blendshapes ||
+        (!frame.vertices.empty() && frame.vertices.size() != characters[character].entry->vertices)) {
+      ++counters.refused;
+      return false;
     }
-    const CharacterSlot& slot = s.characters[character];
+    const CharacterSlot& slot = characters[character];
     id = slot.entry->id;
     weights = slot.weights;
-    if (!frame.vertices.empty() && (slot.wants_mesh || s.options.mesh_without_subscribers)) mesh = slot.mesh;
-    ++s.frames_out;
+    if (!frame.vertices.empty() && (slot.wants_mesh || options.mesh_without_subscribers)) mesh = slot.mesh;
+    ++frames_out;
   }
-  const Stamp stamp = s.freshStamp();
-  s.push(*weights, [&](Encoder& e) { return e.encodeWeights(stamp, id, frame); });
-  if (mesh != nullptr) s.push(*mesh, [&](Encoder& e) { return e.encodeMesh(stamp, id, frame); });
+  const Stamp stamp = freshStamp();
+  bool wake = enqueue(*weights, [&](Encoder& e) { return e.encodeWeights(stamp, id, frame); });
+  if (mesh != nullptr) wake |= enqueue(*mesh, [&](Encoder& e) { return e.encodeMesh(stamp, id, frame); });
+  return wake;
+}
+
+void Publisher::push(const AvatarFrame& frame, std::size_t character) {
+  if (state_->enqueue(frame, character)) state_->wakeUp();
 }
 
 void Publisher::push(const MaskFrame& frame) {
-  state_->push(*state_->source_mask, [&](Encoder& e) { return e.encode(state_->freshStamp(), frame); });
+  State& s = *state_;
+  if (s.enqueue(*s.source_mask, [&](Encoder& e) { return e.encode(s.freshStamp(), frame); })) s.wakeUp();
 }
 
 void Publisher::push(const LandmarkFrame& frame) {
-  state_->push(*state_->source_landmarks, [&](Encoder& e) { return e.encode(state_->freshStamp(), frame); });
+  State& s = *state_;
+  if (s.enqueue(*s.source_landmarks, [&](Encoder& e) { return e.encode(s.freshStamp(), frame); })) s.wakeUp();
+}
+
+void Publisher::send(const LandmarkFrame& landmarks, const MaskFrame& mask, const AvatarFrame& avatar,
+                     std::size_t character) {
+  State& s = *state_;
+  s.enqueue(*s.source_landmarks, [&](Encoder& e) { return e.encode(s.freshStamp(), landmarks); });
+  s.enqueue(*s.source_mask, [&](Encoder& e) { return e.encode(s.freshStamp(), mask); });
+  s.enqueue(avatar, character);
+  const std::lock_guard guard(s.sockets);
+  s.sendQueue();
+  // Sending may have swallowed what the socket's descriptor told of: somebody subscribed. The publishing thread reads
+  // it.
+  if ((s.frames.events() & ZMQ_POLLIN) != 0) s.wakeUp();
 }
 
 bool Publisher::wantsMesh(std::size_t character) const {

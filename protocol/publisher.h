@@ -2,8 +2,8 @@
 //
 // Threads: push..., setReport, wantsMesh and counters are thread-safe and never wait for the network (in WhenFull::wait
 // they may wait for the publishing thread). push encodes in the caller's thread into pooled memory; one thread of the
-// publisher's own owns every socket, stamps seq and t_publish_ns, sends, answers late joiners and speaks status/ twice
-// a second.
+// publisher's own stamps seq and t_publish_ns, sends, answers late joiners and speaks status/ twice a second. send does
+// what push does and that thread's part too, which saves waking it.
 #pragma once
 
 #include <cstdint>
@@ -32,8 +32,8 @@ struct PublisherOptions {
   std::string curve_allow_file;
 
   // Affects memory: messages kept for each subscriber that does not read. Limit per stalled subscriber: this x size of
-  // a message.
-  int send_high_water_mark = 4;
+  // a message. Two frames of everything: one is sent at a stretch, while the one before may still be on its way.
+  int send_high_water_mark = 8;
   bool mesh_without_subscribers = false;  // encode mesh/ even if nobody listens (for measuring)
 };
 
@@ -69,6 +69,11 @@ class Publisher {
   void push(const AvatarFrame& frame, std::size_t character = 0);
   void push(const MaskFrame& frame);
   void push(const LandmarkFrame& frame);
+
+  // One frame of everything, as push, in the order of the arguments; gone to the sockets when it returns. May wait for
+  // what the publishing thread is sending just now.
+  void send(const LandmarkFrame& landmarks, const MaskFrame& mask, const AvatarFrame& avatar,
+            std::size_t character = 0);
 
   // Somebody subscribes to mesh/ of this character: worth computing.
   bool wantsMesh(std::size_t character = 0) const;

@@ -34,7 +34,7 @@ inline constexpr std::int64_t kMaxHandshakeBytes = 1024;  // with CURVE: its han
 struct Stream {
   std::string topic;
   MessageKind kind;
-  std::uint64_t seq = 0;    // of the publishing thread
+  std::uint64_t seq = 0;    // under `sockets`
   std::size_t waiting = 0;  // in the queue; under the queue's mutex
 };
 
@@ -47,7 +47,7 @@ struct Item {
 struct CharacterEntry {
   std::uint64_t id = 0;
   std::size_t blendshapes = 0, vertices = 0;
-  Encoder encoder;  // of the publishing thread
+  Encoder encoder;  // under `sockets`
 };
 
 struct CharacterSlot {
@@ -90,13 +90,14 @@ struct Publisher::State {
 
   void refuse();
 
+  // Into the queue; true: the publishing thread has to be woken for it.
   template <typename Encode>
-  void push(Stream& stream, Encode encode) {
+  bool enqueue(Stream& stream, Encode encode) {
     std::unique_ptr<Buffer> buffer = pool.take();
     if (const Result r = encode(buffer->encoder); !r.ok()) {
       pool.give(std::move(buffer));
       refuse();
-      return;
+      return false;
     }
     const std::int64_t now = monotonicNs();
     {
@@ -110,7 +111,7 @@ struct Publisher::State {
           ++counters.replaced;
           guard.unlock();
           pool.give(std::move(buffer));
-          return;
+          return false;
         }
       } else {
         room.wait(guard, [&] { return stream.waiting < kQueueDepth || stopping; });
@@ -119,16 +120,17 @@ struct Publisher::State {
       ++stream.waiting;
       ++pushed;
     }
-    wakeUp();
+    return true;
   }
+
+  // The messages of one frame of a character; not sent yet.
+  bool enqueue(const AvatarFrame& frame, std::size_t character);
 
   // Under the mutex.
   bool wantsTopic(std::string_view topic) const;
   bool wantsKind(MessageKind kind) const;
 
-  // ---- the publishing thread: publisher_thread.cpp
-  void run();
-  void waitForWork(int timeout_ms);
+  // ---- whoever holds `sockets`: publisher_thread.cpp
   // False when told to stop and nothing is left.
   bool sendQueue();
   void sendBuffer(Stream& stream, std::unique_ptr<Buffer> buffer);
@@ -142,8 +144,13 @@ struct Publisher::State {
   // False when there is more.
   bool readSubscriptions();
   void readMonitor();
+  // All that there is to do. Returns how long nothing will be due, milliseconds; nothing: told to stop, and done.
+  std::optional<int> work(std::int64_t& next_status);
 
-  // ---- answers to subscribers that ask, in the publishing thread: publisher_requests.cpp
+  // ---- the publishing thread
+  void run();
+
+  // ---- answers to subscribers that ask, under `sockets`: publisher_requests.cpp
   // RFC 27 (ZAP): says yes to keys on the list, no to all else.
   void answerAccess();
   // "character/" or "character/NAME/" comes in, pairs of topic and payload go out. False when there is more.
@@ -163,7 +170,9 @@ struct Publisher::State {
 
   int pairs_opened = 0;
 
-  // Of the publishing thread, once it runs.
+  // ZeroMQ's sockets belong to one thread at a time: the publishing thread while it works, or one that sends by itself.
+  // Locked before `mutex`. Guards what follows, once the publishing thread runs.
+  std::mutex sockets;
   Socket frames, snapshots, monitor, zap;
   std::vector<Item> sending;
   std::set<std::uint32_t> connections;

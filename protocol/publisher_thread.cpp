@@ -15,39 +15,49 @@ constexpr std::size_t kMaxSubscriptions = 4096;         // distinct prefixes tha
 
 }  // namespace
 
-void Publisher::State::run() {
-  std::int64_t next_status = monotonicNs();
-  while (true) {
-    // Frames first, all else after them. Reading comes last, so that the descriptors tell of anything new: see
-    // Socket::fd.
-    if (!sendQueue()) {
-      sendStatus(true);
-      return;
-    }
-    const std::int64_t now = monotonicNs();
-    if (now >= next_status) {
-      sendStatus(false);
-      next_status = now + kStatusPeriodNs;
-    }
-    const std::int64_t next_character = sendDueCharacters();
-    readMonitor();
-    answerAccess();
-    const bool all_answered = answerRequests();
-    const bool all_read = readSubscriptions() && all_answered;
-    const std::int64_t wait_ns = all_read ? std::min(next_status, next_character) - monotonicNs() : 0;
-    waitForWork(static_cast<int>(std::clamp<std::int64_t>((wait_ns + kMs - 1) / kMs, 0, 500)));
+std::optional<int> Publisher::State::work(std::int64_t& next_status) {
+  // Frames first, all else after them. Reading comes last, so that the descriptors tell of anything new: see
+  // Socket::fd.
+  if (!sendQueue()) {
+    sendStatus(true);
+    return std::nullopt;
   }
+  const std::int64_t now = monotonicNs();
+  if (now >= next_status) {
+    sendStatus(false);
+    next_status = now + kStatusPeriodNs;
+  }
+  const std::int64_t next_character = sendDueCharacters();
+  readMonitor();
+  answerAccess();
+  const bool all_answered = answerRequests();
+  const bool all_read = readSubscriptions() && all_answered;
+  const std::int64_t wait_ns = all_read ? std::min(next_status, next_character) - monotonicNs() : 0;
+  return static_cast<int>(std::clamp<std::int64_t>((wait_ns + kMs - 1) / kMs, 0, 500));
 }
 
-void Publisher::State::waitForWork(int timeout_ms) {
-  std::array<pollfd, 5> items{{{wake_fd, POLLIN, 0},
-                               {frames.fd(), POLLIN, 0},
-                               {snapshots.fd(), POLLIN, 0},
-                               {monitor.fd(), POLLIN, 0},
-                               {zap.fd(), POLLIN, 0}}};
-  ::poll(items.data(), items.size(), timeout_ms);  // a descriptor of -1 is passed over
-  std::uint64_t count = 0;
-  [[maybe_unused]] const ssize_t got = ::read(wake_fd, &count, sizeof(count));
+void Publisher::State::run() {
+  std::int64_t next_status = monotonicNs();
+  std::array<pollfd, 5> items{};
+  {
+    const std::lock_guard guard(sockets);
+    items = {{{wake_fd, POLLIN, 0},
+              {frames.fd(), POLLIN, 0},
+              {snapshots.fd(), POLLIN, 0},
+              {monitor.fd(), POLLIN, 0},
+              {zap.fd(), POLLIN, 0}}};
+  }
+  while (true) {
+    std::optional<int> wait_ms;
+    {
+      const std::lock_guard guard(sockets);
+      wait_ms = work(next_status);
+    }
+    if (!wait_ms) return;
+    ::poll(items.data(), items.size(), *wait_ms);  // a descriptor of -1 is passed over
+    std::uint64_t count = 0;
+    [[maybe_unused]] const ssize_t got = ::read(wake_fd, &count, sizeof(count));
+  }
 }
 
 bool Publisher::State::sendQueue() {

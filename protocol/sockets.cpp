@@ -3,6 +3,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <sched.h>
 #include <sys/stat.h>
 
 namespace volto::protocol {
@@ -10,6 +11,8 @@ namespace volto::protocol {
 Context::Context() : context_(zmq_ctx_new()) {
   if (context_ == nullptr)
     throw SetupError(SetupError::Kind::failed, std::string("ZeroMQ cannot start: ") + zmq_strerror(zmq_errno()));
+  // ZeroMQ's own thread, woken by what is sent, does not take the processor from the one that is sending.
+  zmq_ctx_set(context_, ZMQ_THREAD_SCHED_POLICY, SCHED_BATCH);
 }
 
 Socket::Socket(const Context& context, int type) : socket_(zmq_socket(context.get(), type)) {
@@ -57,6 +60,13 @@ int Socket::fd() const {
   std::size_t size = sizeof(fd);
   if (socket_ != nullptr) zmq_getsockopt(socket_, ZMQ_FD, &fd, &size);
   return fd;
+}
+
+int Socket::events() const {
+  int events = 0;
+  std::size_t size = sizeof(events);
+  if (socket_ != nullptr) zmq_getsockopt(socket_, ZMQ_EVENTS, &events, &size);
+  return events;
 }
 
 Message::Message(std::string_view content) {

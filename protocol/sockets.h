@@ -49,6 +49,8 @@ class Socket {
   // For poll(2). It tells of changes only: read the socket until nothing is left (and send nothing in between) before
   // waiting on it.
   int fd() const;
+  // ZMQ_POLLIN, ZMQ_POLLOUT: what is possible now.
+  int events() const;
 
  private:
   void* socket_ = nullptr;

@@ -6,6 +6,7 @@
 #include "retarget/eyes.h"
 #include "retarget/packed_corrections.h"
 #include "rig/pose.h"
+#include "rig/prepared_contacts.h"
 
 namespace volto::retarget {
 
@@ -15,13 +16,17 @@ struct FaceDeformer::State {
   Deformer deformer;
   Eyes eyes;
   PackedCorrections corrections;
+  rig::PreparedContacts contacts;
 
   explicit State(const rig::Rig& rig)
-      : neutral(rig::neutralPositions(checked(rig))), deformer(rig.deformation, neutral), eyes(rig), corrections(rig) {
+      : neutral(rig::neutralPositions(checked(rig))),
+        deformer(rig.deformation, neutral),
+        eyes(rig),
+        corrections(rig),
+        contacts(rig.contacts, neutral) {
     layers.blendshapes = rig.blendshapes;
     for (rig::Blendshape& shape : layers.blendshapes) shape.correction = {};  // packed above
     layers.part_motions = rig.part_motions;
-    layers.contacts = rig.contacts;
   }
 
   static const rig::Rig& checked(const rig::Rig& rig) {
@@ -53,7 +58,7 @@ void FaceDeformer::deform(const MeshMaskDisplacement& mask, std::span<const floa
   rig::putPartsBack(s.layers, s.neutral, out);
   s.corrections.addTo(weights, out);
   rig::turnParts(s.layers, weights, !gaze_known, out);
-  rig::resolveContacts(s.layers.contacts, s.neutral, out);
+  s.contacts.resolve(out);
   if (gaze_known) s.eyes.turn(gaze, out);
 }
 

@@ -62,4 +62,6 @@ void Retargeter::push(const MaskFrame& in, AvatarFrame& out) {
 
 void Retargeter::reset() { state_->solver.reset(); }
 
+void Retargeter::setMesh(bool mesh) { state_->options.mesh = mesh; }
+
 }  // namespace volto::retarget

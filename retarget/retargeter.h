@@ -29,6 +29,8 @@ class Retargeter {
   // forgets it. Allocates nothing once `out` has been through it.
   void push(const MaskFrame& in, AvatarFrame& out);
   void reset();
+  // Whether the frames to come carry the deformed vertices: RetargetOptions::mesh, changed.
+  void setMesh(bool mesh);
 
  private:
   struct State;

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
+#include "rig/prepared_contacts.h"
 #include "rig/unfold_rounds.h"
 #include "rig/vec3.h"
 
@@ -130,12 +132,14 @@ bool partSides(const SlitContact& slit, const BallContact* ball, std::span<Vec3>
 }
 
 // Triangles that were nearly turned over get back what they need; the lids stay out of the balls meanwhile.
-void unfold(const Contacts& contacts, std::span<Vec3> positions) {
+// `known`: the guard's blocks where somebody has kept them.
+void unfold(const Contacts& contacts, const TriangleBlocks* known, std::span<Vec3> positions) {
   constexpr int kMostRounds = 24, kBallsEvery = 4;
   if (contacts.folds.empty()) return;
   std::array<TouchedVertices, 2> touched;
   if (unfoldFirst(contacts.folds, contacts.folds.watched, touched[0], positions) == 0) return;
-  const TriangleBlocks blocks(contacts.folds);
+  std::optional<TriangleBlocks> made;
+  const TriangleBlocks& blocks = known != nullptr ? *known : made.emplace(contacts.folds);
   for (int round = 1; round < kMostRounds; ++round) {
     TouchedVertices &reach = touched[static_cast<std::size_t>(round + 1) % 2],
                     &now = touched[static_cast<std::size_t>(round) % 2];
@@ -147,24 +151,41 @@ void unfold(const Contacts& contacts, std::span<Vec3> positions) {
   }
 }
 
+// What does not change of a rider.
+struct RiderAtRest {
+  Vec3 place{};   // its own
+  Vec3 anchor{};  // of the point that it rides on
+  // Where there is a ball: unit, from its centre to that point; from there to the rider.
+  Vec3 arm{}, lever{};
+};
+
+RiderAtRest atRest(const Rider& rider, const BallContact* ball, std::span<const Vec3> neutral) {
+  RiderAtRest out;
+  for (std::size_t k = 0; k < 3; ++k) out.anchor = out.anchor + rider.weight[k] * neutral[rider.anchor[k]];
+  out.place = neutral[rider.vertex];
+  if (ball == nullptr) return out;
+  out.lever = out.place - out.anchor;
+  const Vec3 arm = out.anchor - ball->centre;
+  if (const float length = std::sqrt(dot(arm, arm)); length > 0) out.arm = (1 / length) * arm;
+  return out;
+}
+
 // Where the anchors went, and how they turned about the ball.
-void ride(const Rider& rider, const BallContact* ball, std::span<const Vec3> neutral, std::span<Vec3> positions) {
-  Vec3 at_rest{}, now{}, moved{};
-  for (std::size_t k = 0; k < 3; ++k) {
-    at_rest = at_rest + rider.weight[k] * neutral[rider.anchor[k]];
-    now = now + rider.weight[k] * positions[rider.anchor[k]];
-    moved = moved + rider.weight[k] * (positions[rider.anchor[k]] - neutral[rider.anchor[k]]);
-  }
-  Vec3 out = neutral[rider.vertex] + moved;
+[[gnu::always_inline]] inline void ride(const Rider& rider, const RiderAtRest& rest, const BallContact* ball,
+                                        std::span<Vec3> positions) {
+  Vec3 now{};
+  for (std::size_t k = 0; k < 3; ++k) now = now + rider.weight[k] * positions[rider.anchor[k]];
+  const Vec3 moved = now - rest.anchor;
+  Vec3 out = rest.place + moved;
   if (ball != nullptr && dot(moved, moved) > 0) {
-    Vec3 from = at_rest - ball->centre, to = now - ball->centre;
-    const float lengths = std::sqrt(dot(from, from) * dot(to, to));
-    if (lengths > 0) {
-      // The smallest rotation from `from` to `to`: v + c x v + c x (c x v) / (1 + cos).
-      const Vec3 c = (1 / lengths) * cross(from, to), v = neutral[rider.vertex] - at_rest;
-      const float cosine = dot(from, to) / lengths;
-      const Vec3 cv = cross(c, v);
-      if (cosine > -0.9F) out = out + cv + (1 / (1 + cosine)) * cross(c, cv);
+    const Vec3 to = now - ball->centre;
+    const float length = std::sqrt(dot(to, to)), along = dot(rest.arm, to);
+    // The smallest rotation from `arm` to `to`, of which c and `along` hold sine and cosine times the length:
+    // v + c x v + c x (c x v) / (1 + cos). Where there is no arm c is nothing.
+    if (along > -0.9F * length) {
+      const Vec3 c = cross(rest.arm, to), cv = cross(c, rest.lever);
+      const float sum = length + along, share = 1 / (length * sum);
+      out = out + (share * sum) * cv + share * cross(c, cv);
     }
   }
   positions[rider.vertex] = out;
@@ -172,6 +193,17 @@ void ride(const Rider& rider, const BallContact* ball, std::span<const Vec3> neu
 
 const BallContact* ballOf(const Contacts& contacts, std::int32_t index) {
   return index < 0 ? nullptr : &contacts.balls[static_cast<std::size_t>(index)];
+}
+
+// All but the riders.
+void settle(const Contacts& contacts, const TriangleBlocks* blocks, std::span<Vec3> positions) {
+  for (const BallContact& ball : contacts.balls) keepOnBall(ball, true, positions);
+  bool moved = false;  // beside a ball
+  for (const SlitContact& slit : contacts.slits)
+    if (partSides(slit, ballOf(contacts, slit.ball), positions)) moved = moved || slit.ball >= 0;
+  if (moved)
+    for (const BallContact& ball : contacts.balls) keepOnBall(ball, false, positions);
+  unfold(contacts, blocks, positions);
 }
 
 }  // namespace
@@ -184,14 +216,36 @@ std::array<float, kMaxSlitColumns> slitGaps(const SlitContact& slit, std::span<c
 }
 
 void resolveContacts(const Contacts& contacts, std::span<const Vec3> neutral, std::span<Vec3> positions) {
-  for (const BallContact& ball : contacts.balls) keepOnBall(ball, true, positions);
-  bool moved = false;  // beside a ball
-  for (const SlitContact& slit : contacts.slits)
-    if (partSides(slit, ballOf(contacts, slit.ball), positions)) moved = moved || slit.ball >= 0;
-  if (moved)
-    for (const BallContact& ball : contacts.balls) keepOnBall(ball, false, positions);
-  unfold(contacts, positions);
-  for (const Rider& rider : contacts.riders) ride(rider, ballOf(contacts, rider.ball), neutral, positions);
+  settle(contacts, nullptr, positions);
+  for (const Rider& rider : contacts.riders) {
+    const BallContact* const ball = ballOf(contacts, rider.ball);
+    ride(rider, atRest(rider, ball, neutral), ball, positions);
+  }
+}
+
+struct PreparedContacts::State {
+  Contacts contacts;
+  TriangleBlocks blocks;
+  std::vector<RiderAtRest> riders;
+};
+
+PreparedContacts::PreparedContacts(const Contacts& contacts, std::span<const Vec3> neutral) {
+  auto state = std::make_unique<State>(State{contacts, TriangleBlocks(contacts.folds), {}});
+  for (const Rider& rider : contacts.riders)
+    state->riders.push_back(atRest(rider, ballOf(contacts, rider.ball), neutral));
+  state_ = std::move(state);
+}
+PreparedContacts::~PreparedContacts() = default;
+PreparedContacts::PreparedContacts(PreparedContacts&&) noexcept = default;
+PreparedContacts& PreparedContacts::operator=(PreparedContacts&&) noexcept = default;
+
+void PreparedContacts::resolve(std::span<Vec3> positions) const {
+  const State& s = *state_;
+  settle(s.contacts, &s.blocks, positions);
+  for (std::size_t i = 0; i < s.riders.size(); ++i) {
+    const Rider& rider = s.contacts.riders[i];
+    ride(rider, s.riders[i], ballOf(s.contacts, rider.ball), positions);
+  }
 }
 
 Penetration measurePenetration(const Contacts& contacts, std::span<const Vec3> positions) {

@@ -163,16 +163,19 @@ bool FrameFit::improve(const Observation& seen, const WeightPrior& prior, int it
   const auto linearise = [&] {
     linearised_at = tried_pose.rotation;
     composeNormalMatrices(seen);
-    posterior_ = normal_.information + prior.precision;
+    posterior_ = normal_.information + prior.tightness * prior.precision;
   };
   if (kept == nullptr) {
     linearise();
   } else {
-    posterior_ = kept->information + prior.precision;
+    posterior_ = kept->information + prior.tightness * prior.precision;
   }
+  ShapeVector prior_pull;  // the prior's slope at the weights that were asked for last
   const auto costOf = [&](const ShapeVector& w) {
     const ShapeVector off = w - prior.mean;
-    return cost_ + 0.5 * off.dot(prior.precision * off);
+    prior_pull.noalias() = prior.precision * off;
+    prior_pull *= prior.tightness;
+    return cost_ + 0.5 * off.dot(prior_pull);
   };
   double cost = costOf(tried);
   bool linearised_here = true;  // at the pose and weights that the next step starts from
@@ -184,7 +187,7 @@ bool FrameFit::improve(const Observation& seen, const WeightPrior& prior, int it
     pull.noalias() += basis_->axes()[2].transpose() * pull_[2];
     ShapeVector slope = pull.cast<double>() / variance_;
     slope.noalias() -= normal.cross.transpose() * free_pose;
-    slope.noalias() -= prior.precision * (tried - prior.mean);
+    slope -= prior_pull;
     const ShapeVector before = tried;
     const ViewPose pose_before = tried_pose;
     for (int sweep = 0; sweep < sweeps; ++sweep) {
@@ -219,6 +222,7 @@ bool FrameFit::improve(const Observation& seen, const WeightPrior& prior, int it
     if (!evaluate(seen, tried_pose, tried)) return false;
     if (linearised_here) break;
     linearise();
+    costOf(tried);
     linearised_here = true;
   }
   if (!tried.allFinite() || !tried_pose.rotation.allFinite() || !tried_pose.translation.allFinite()) return false;

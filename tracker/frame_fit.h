@@ -2,10 +2,10 @@
 // Internal to the tracker.
 //
 // Gauss-Newton on pose and weights together: the pose is eliminated (Schur complement), the weights are found by
-// coordinate descent within their bounds (warm start). The normal matrix is made once per frame and again where the head
-// has turned since (Settings::linear_within_rad), residuals and gradients in every iteration; a step that makes the fit
-// worse is taken back, and the matrix made anew. Outliers have their residual cut (the modified residuals of Huber and
-// Dutter), which leaves the matrix alone.
+// coordinate descent within their bounds (warm start). The normal matrix is made once per frame and again where the
+// head has turned since (Settings::linear_within_rad), residuals and gradients in every iteration; a step that makes
+// the fit worse is taken back, and the matrix made anew. Outliers have their residual cut (the modified residuals of
+// Huber and Dutter), which leaves the matrix alone.
 #pragma once
 
 #include <vector>
@@ -31,9 +31,10 @@ struct Observation {
   Eigen::VectorXd weight;  // 0: missing; else 1, or a detector's own doubt
 };
 
-// A Gaussian over weights, as its precision matrix, and the bounds.
+// A Gaussian over weights, and the bounds. Its precision is `tightness` times the matrix.
 struct WeightPrior {
   ShapeMatrix precision = ShapeMatrix::Identity();
+  double tightness = 1;
   ShapeVector mean = ShapeVector::Zero();
   double low = 0, high = 1;
 };

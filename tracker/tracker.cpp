@@ -98,7 +98,7 @@ struct Tracker::State {
 
   void build(LandmarkLayout layout) {
     parts.emplace(*this, layout);
-    precision = expression->secondMoment(settings.correlation).llt().solve(ShapeMatrix::Identity());
+    prior.precision = expression->secondMoment(settings.correlation).llt().solve(ShapeMatrix::Identity());
     usual.setZero();
     if (fixed) fixNeutral(*fixed);
     tracking = false;
@@ -121,7 +121,7 @@ struct Tracker::State {
       }
       habits = expression->covarianceOf(spread, settings.correlation);
     }
-    precision = habits.llt().solve(ShapeMatrix::Identity());
+    prior.precision = habits.llt().solve(ShapeMatrix::Identity());
     parts->estimator.fixNeutral(parts->neutral, mm, usual, habits);
     known = true;
     known_s = kSettle_s;
@@ -142,7 +142,7 @@ struct Tracker::State {
   std::optional<NeutralFace> fixed;
 
   // Expression statistics in use.
-  ShapeMatrix precision;
+  WeightPrior prior;
   ShapeVector usual;
   bool known = false;  // the neutral rests on this actor's frames
   double known_s = 0;
@@ -154,7 +154,6 @@ struct Tracker::State {
   std::optional<double> to_learn_dt_s;  // the last frame still has to be learned from; its distance to the one before
   ViewPose pose;
   ShapeVector weights = ShapeVector::Zero();
-  WeightPrior prior;
   RegionFilters filters;
   HeadFilter head_filter;
   GazeTracker gaze;
@@ -178,7 +177,7 @@ bool Tracker::State::track(double dt_s) {
   }
   // An expression persists: the weights follow an Ornstein-Uhlenbeck process about the usual expression.
   const double keep = tracking && settings.expression_memory_s > 0 ? std::exp(-dt_s / settings.expression_memory_s) : 0;
-  prior.precision = precision / (1 - keep * keep);
+  prior.tightness = 1 / (1 - keep * keep);
   prior.mean = usual + keep * (weights - usual);
   const int iterations = tracking ? kIterations : 3 * kIterations;
   bool good = p.fit.improve(p.seen, prior, iterations, kSweeps, pose, weights);
@@ -187,7 +186,7 @@ bool Tracker::State::track(double dt_s) {
     ViewPose other_pose;
     ShapeVector other = usual;
     if (p.fit.initialisePose(p.seen, other_pose)) {
-      prior.precision = precision;
+      prior.tightness = 1;
       prior.mean = usual;
       if (p.fit.improve(p.seen, prior, 3 * kIterations, kSweeps, other_pose, other) && p.fit.rms_mm() < rms) {
         pose = other_pose;
@@ -220,7 +219,7 @@ void Tracker::State::learn() {
 void Tracker::State::adoptEstimate() {
   Parts& p = *parts;
   usual = p.estimator.usualExpression();
-  precision = p.estimator.habits().llt().solve(ShapeMatrix::Identity());
+  prior.precision = p.estimator.habits().llt().solve(ShapeMatrix::Identity());
   if (fixed) return;
   p.target = p.estimator.neutralDeviation();
   known = true;

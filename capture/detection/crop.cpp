@@ -119,15 +119,17 @@ Covered coveredBy(const Image& image, const ImageFromCrop& image_from_crop, int 
 
 // The picture was written by another thread and may lie anywhere. Sampled at an angle it would come line by line, each
 // waited for; asked for beforehand it comes all at once.
-void fetch(const Image& image, const Covered& part) {
+void fetchRow(const Image& image, const Covered& part, int y) {
   constexpr std::size_t kLine = 64;
-  for (int y = part.top; y < part.bottom; ++y) {
-    const std::uint8_t* const row =
-        image.bgr.data() + 3 * static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width);
-    for (std::size_t at = 3 * static_cast<std::size_t>(part.left); at < 3 * static_cast<std::size_t>(part.right);
-         at += kLine)
-      hwy::Prefetch(row + at);
-  }
+  const std::uint8_t* const row =
+      image.bgr.data() + 3 * static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width);
+  for (std::size_t at = 3 * static_cast<std::size_t>(part.left); at < 3 * static_cast<std::size_t>(part.right);
+       at += kLine)
+    hwy::Prefetch(row + at);
+}
+
+void fetch(const Image& image, const Covered& part) {
+  for (int y = part.top; y < part.bottom; ++y) fetchRow(image, part, y);
 }
 
 // Whether a crop lies within the image so far that no sample, nor what is beside it, is outside.
@@ -145,11 +147,16 @@ bool liesInside(const Image& image, const ImageFromCrop& image_from_crop, int wi
 bool halve(const Image& image, const ImageFromCrop& image_from_crop, int width, int height, Image& out,
            ImageFromCrop& out_from_crop) {
   constexpr double kAround = 8;  // more than a sample reaches, twice as large
-  const auto [left, top, right, bottom] = coveredBy(image, image_from_crop, width, height, kAround);
+  constexpr int kAhead = 16;     // rows that are asked for before they are looked at
+  const Covered part = coveredBy(image, image_from_crop, width, height, kAround);
+  const auto [left, top, right, bottom] = part;
   if (right - left < 2 || bottom - top < 2) return false;
   out.resize((right - left) / 2, (bottom - top) / 2);
   const std::size_t row_bytes = 3 * static_cast<std::size_t>(image.width);
+  for (int y = top; y < std::min(top + kAhead, bottom); ++y) fetchRow(image, part, y);
   for (int y = 0; y < out.height; ++y) {
+    for (int next = top + 2 * y + kAhead; next < std::min(top + 2 * y + kAhead + 2, bottom); ++next)
+      fetchRow(image, part, next);
     const std::uint8_t* const above =
         image.bgr.data() + static_cast<std::size_t>(top + 2 * y) * row_bytes + 3 * static_cast<std::size_t>(left);
     halveRows(above, above + row_bytes, out.width,
@@ -327,7 +334,8 @@ void sampleCrop(const Image& image, const ImageFromCrop& image_from_crop, int wi
                 const Normalisation& normalisation, bool black_outside, std::span<float> planes) {
   if (planes.size() < 3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height))
     throw std::invalid_argument("too little room for a crop");
-  if (!black_outside) fetch(image, coveredBy(image, image_from_crop, width, height, 1));
+  if (!black_outside && image_from_crop.scale() < kHalveFrom)
+    fetch(image, coveredBy(image, image_from_crop, width, height, 1));
   thread_local std::array<Image, 2> halved;  // they keep their memory
   const Image* from = &image;
   ImageFromCrop from_crop = image_from_crop, next;

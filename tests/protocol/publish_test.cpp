@@ -172,6 +172,42 @@ TEST_F(PublishTest, LandmarksAndMasksAreStreamsOfTheSource) {
   EXPECT_EQ(mask.frame.displacement_fapu, sampleMask(3).displacement_fapu);
 }
 
+TEST_F(PublishTest, AFrameSentByItsCallerIsGoneWhenTheCallReturnsAndNewcomersAreStillNoticed) {
+  Publisher publisher(publisherAt("a", WhenFull::newest_wins));
+  publisher.setCharacter(sampleCharacter(50));
+  Subscriber all(subscriberTo(publisher, {"landmarks/", "mask/", "weights/", "mesh/"}));
+  ASSERT_TRUE(publisher.waitForSubscriber(MessageKind::mesh, 3000));
+  ASSERT_TRUE(eventually([&] { return publisher.wantsMesh() && publisher.wants(MessageKind::weights); }));
+  ReceivedMessage message;
+  for (int i = 1; i <= 50; ++i) {
+    const std::uint64_t before = publisher.counters().sent;
+    publisher.send(sampleLandmarks(3), sampleMask(3), sampleAvatar(i, 50));
+    EXPECT_GE(publisher.counters().sent, before + 4);
+    for (const MessageKind kind :
+         {MessageKind::landmarks, MessageKind::mask, MessageKind::weights, MessageKind::mesh}) {
+      ASSERT_TRUE(all.receive(message, 3000)) << i;
+      EXPECT_EQ(message.kind, kind);
+    }
+  }
+  EXPECT_EQ(publisher.counters().replaced, 0U);
+  // Sending goes on all the time while others come and ask, and while another thread pushes.
+  std::atomic<bool> stop{false};
+  std::thread sender([&] {
+    while (!stop) publisher.send(sampleLandmarks(3), sampleMask(3), sampleAvatar(1, 50));
+  });
+  std::thread pusher([&] {
+    while (!stop) publisher.push(sampleMask(3));
+  });
+  for (int i = 0; i < 5; ++i) {
+    Subscriber late(subscriberTo(publisher, {"character/", "status/"}));
+    EXPECT_TRUE(next(late, MessageKind::character, message)) << i;
+    EXPECT_TRUE(next(late, MessageKind::status, message)) << i;
+  }
+  stop = true;
+  sender.join();
+  pusher.join();
+}
+
 TEST_F(PublishTest, StatusComesTwiceASecondThoughNothingHappens) {
   Publisher publisher(publisherAt("a"));
   StatusReport report;

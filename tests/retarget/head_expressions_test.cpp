@@ -14,6 +14,7 @@
 #include "rig/build_rig.h"
 #include "rig/mesh_io.h"
 #include "rig/pose.h"
+#include "rig/prepared_contacts.h"
 #include "tests/retarget/allocation_counter.h"
 #include "tests/support/test_data.h"
 
@@ -234,6 +235,22 @@ TEST_P(HeadExpressions, WrongWeightsAreRefused) {
   rig::Rig broken = rig();
   broken.blendshapes[0].correction = {{static_cast<std::uint32_t>(broken.neutral.vertexCount())}, {{0, 0, 0}}};
   EXPECT_THROW(FaceDeformer{broken}, std::invalid_argument);
+}
+
+TEST_P(HeadExpressions, PreparedContactsResolveAsThoseOfTheRigToTheBit) {
+  const std::vector<Vertex> neutral = rig::neutralPositions(rig());
+  const rig::PreparedContacts prepared(rig().contacts, neutral);
+  for (const Weights& weights : {Weights{}, Weights{{"eyeBlinkLeft", 1.0F}, {"eyeBlinkRight", 0.7F}},
+                                 Weights{{"mouthClose", 1.0F}, {"mouthPucker", 1.0F}, {"eyeSquintLeft", 1.0F}}}) {
+    std::vector<Vertex> once(neutral.size()), again(neutral.size());
+    rig::poseByOperator(rig(), weightsByName(rig(), weights), neutral, once);
+    again = once;
+    const std::vector<Vertex> before = once;
+    rig::resolveContacts(rig().contacts, neutral, once);
+    prepared.resolve(again);
+    EXPECT_EQ(once, again);
+    EXPECT_EQ(once == before, weights.empty()) << "contacts move something, and nothing at rest";
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Of, HeadExpressions, ::testing::Values("volto_head", "volto_creature"),

@@ -17,10 +17,12 @@
 #include "capture/detection/model_manifest.h"
 #include "capture/face_choice.h"
 #include "capture/video/video_source.h"
+#include "protocol/subscriber.h"
 #include "protocol/take_reader.h"
 #include "tests/retarget/synthetic_rig.h"
 #include "tests/support/test_data.h"
 #include "tests/tools/synthetic_performance.h"
+#include "tools/pipeline/character.h"
 
 namespace volto::pipeline {
 namespace {
@@ -137,6 +139,29 @@ TEST_F(LiveDatagrams, ACalibrationTakesTheNextSecondAsRest) {
   EXPECT_EQ(live.report().calibrations, 1U);
 }
 
+TEST_F(LiveDatagrams, TheMeshIsDeformedOnlyForThoseWhoAskForIt) {
+  publisher.setCharacter(characterOf(rig, true));
+  LiveOptions options;
+  options.mesh_on_demand = true;
+  std::atomic<std::size_t> without{0}, with{0};
+  options.look = [&](const LiveFrame& frame) { ++(frame.avatar.vertices.empty() ? without : with); };
+  Live live(rig, std::move(input), publisher, options);
+  live.start();
+  perform(10);
+  EXPECT_EQ(with, 0U);
+  EXPECT_GT(without, 0U);
+  protocol::SubscriberOptions asking;
+  asking.endpoint = publisher.endpoint();
+  asking.topics = {"mesh/"};
+  protocol::Subscriber subscriber(asking);
+  ASSERT_TRUE(publisher.waitForSubscriber(protocol::MessageKind::mesh, 3000));
+  perform(10);
+  protocol::ReceivedMessage message;
+  EXPECT_TRUE(subscriber.receive(message, 1000));
+  live.stop();
+  EXPECT_GT(with, 0U);
+}
+
 TEST_F(LiveDatagrams, StoppingTakesLessThanASecondWithAndWithoutInput) {
   Live live(rig, std::move(input), publisher, watched());
   live.start();
@@ -206,9 +231,9 @@ TEST_F(LiveVideo, BothGifsAreTrackedInEveryFrameAndNoHeadJumps) {
     const char *video, *face;
     double farthest_roll_deg;
   };
-  for (const Case& one :
-       {Case{"head-pose-face-detection-male.gif", "front", 0}, Case{"head-pose-face-detection-female-and-male.gif", "1", 40},
-        Case{"head-pose-face-detection-female-and-male.gif", "2", 35}}) {
+  for (const Case& one : {Case{"head-pose-face-detection-male.gif", "front", 0},
+                          Case{"head-pose-face-detection-female-and-male.gif", "1", 40},
+                          Case{"head-pose-face-detection-female-and-male.gif", "2", 35}}) {
     masks.clear();
     LiveOptions options = watched();
     options.every_frame = true;

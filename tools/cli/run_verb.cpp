@@ -117,8 +117,8 @@ void printStages(const pipeline::LiveReport& report) {
         "pupils %.3f ms; of all that the networks themselves %.3f ms; %llu doubts, %llu losses\n",
         per_frame(f.detector_ns), static_cast<unsigned long long>(f.searches),
         static_cast<unsigned long long>(f.checks), per_frame(f.landmarks_ns),
-        static_cast<unsigned long long>(f.networks), per_frame(f.pupils_ns), per_frame(f.networks_ns), static_cast<unsigned long long>(f.doubts),
-        static_cast<unsigned long long>(f.losses));
+        static_cast<unsigned long long>(f.networks), per_frame(f.pupils_ns), per_frame(f.networks_ns),
+        static_cast<unsigned long long>(f.doubts), static_cast<unsigned long long>(f.losses));
   }
 }
 
@@ -216,6 +216,7 @@ int run(const Options& options) {
   if (!live_options.every_frame && options.threads == 0) capture::measureNetworkThreads();
   live_options.tracking.tracker.from_pixels = true;
   live_options.mesh = !options.no_mesh || options.wantsPreview();
+  live_options.mesh_on_demand = !options.wantsPreview();
 
   std::optional<pipeline::Preview> preview;
   if (options.wantsPreview()) {
@@ -333,8 +334,10 @@ RunVerb defineRun(CLI::App& app) {
   app.add_option("--sheet", options->sheet, "at the end: moments of the performance, face beside avatar")
       ->type_name("F.png");
   app.add_flag("--no-mesh", options->no_mesh, "weights only: neither compute nor publish the deformed mesh");
-  app.add_option("--threads", options->threads, "of the networks (default 0: live one or one per processor, whichever is quicker at the time; else one per "
-                 "processor)")
+  app.add_option(
+         "--threads", options->threads,
+         "of the networks (default 0: live one or one per processor, whichever is quicker at the time; else one per "
+         "processor)")
       ->type_name("N")
       ->check(CLI::Range(0, 64));
   app.add_option("--wait", options->wait_s, "wait at most so long for a first subscriber (default 0: do not wait)")

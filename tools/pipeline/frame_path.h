@@ -63,6 +63,7 @@ class FramePath {
   void learn() { tracking_.learn(); }
   void setNeutral(const tracker::NeutralFace& neutral) { tracking_.setNeutral(neutral); }
   tracker::NeutralFace neutral() const { return tracking_.neutral(); }
+  void setMesh(bool mesh) { retargeter_.setMesh(mesh); }  // see retarget/retargeter.h
 
   // Of the last push; valid until the next.
   MaskFrame& mask() { return mask_; }

@@ -18,7 +18,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr std::int64_t kReportInterval_ns = 500'000'000;
-constexpr auto kPatience = 50ms;                   // how long a stage waits before it looks around
+constexpr auto kPatience = 50ms;  // how long a stage waits before it looks around
 // A file in real time: frames that may wait before a stage. A stall of a few of them is made up for within a second,
 // and a frame that is shown a little late bears its own time all the same. A camera's frames never wait.
 constexpr std::size_t kFileRoom = 6;
@@ -37,12 +37,13 @@ struct Found {
   std::int64_t worked_ns = 0;  // by the stages so far, without the networks and without waiting
 };
 
-struct Shown {
+// A frame that has been sent, for those who look at it.
+struct Sent {
   LandmarkFrame landmarks;
   capture::Image image;
   MaskFrame mask;
   AvatarFrame avatar;
-  std::int64_t t_shown_ns = 0, arrived_ns = 0, worked_ns = 0;
+  std::int64_t t_source_ns = 0;
 };
 
 // What a stage has done; read by others.
@@ -79,7 +80,7 @@ struct Live::State {
         path(rig, o.tracking, {.mesh = o.mesh, .weights = true}),
         captured(policy(), room()),
         found(policy(), room()),
-        shown(policy(), room()) {}
+        sent(policy()) {}
 
   SlotPolicy policy() const { return options.every_frame ? SlotPolicy::every_frame : SlotPolicy::newest_wins; }
   std::size_t room() const { return input.live || options.every_frame ? 1 : kFileRoom; }
@@ -88,7 +89,8 @@ struct Live::State {
   void captureDatagrams();
   void detect();
   void track();
-  void publish();
+  void publish(Found& item);
+  void show();
   void beSilent(Found& item);
   void calibrate(const LandmarkFrame& landmarks);
   void noteSource();
@@ -112,7 +114,7 @@ struct Live::State {
   void closeAll(bool throw_away) {
     captured.close(throw_away);
     found.close(throw_away);
-    shown.close(throw_away);
+    sent.close(throw_away);
   }
 
   LiveInput input;
@@ -124,14 +126,15 @@ struct Live::State {
 
   Slot<Captured> captured;
   Slot<Found> found;
-  Slot<Shown> shown;
+  Slot<Sent> sent;
   std::atomic<bool> stopping{false};
   std::atomic<bool> calibrate_wanted{false};
   std::atomic<std::uint64_t> frames_sent{0}, faces{0}, calibrations{0};
   std::vector<std::thread> threads;
   std::int64_t start_ns = 0;
 
-  Meter capture_meter, detection_meter, tracker_meter, retarget_meter, learning_meter, publish_meter, work_meter, whole_meter;
+  Meter capture_meter, detection_meter, tracker_meter, retarget_meter, learning_meter, publish_meter, work_meter,
+      whole_meter;
 
   // The tracker thread's own.
   std::vector<LandmarkFrame> rest;
@@ -265,7 +268,7 @@ void Live::State::calibrate(const LandmarkFrame& landmarks) {
 
 void Live::State::track() {
   Found in;
-  Shown out;
+  Sent out;
   std::int64_t last_ns = 0;  // of the tracker's own time
   std::uint64_t last_seq = 0;
   LandmarkLayout last_layout = LandmarkLayout::ibug68;
@@ -285,12 +288,19 @@ void Live::State::track() {
     }
     const std::int64_t before = monotonicNow();
     calibrate(in.landmarks);
+    if (options.mesh && options.mesh_on_demand) path.setMesh(publisher.wantsMesh());
     path.push(in.landmarks);
     if (input.live) last_ns = before;
     last_seq = in.landmarks.capture_seq;
     last_layout = in.landmarks.layout;
     tracker_meter.add(path.trackedAt() - before);
     retarget_meter.add(path.retargetedAt() - path.trackedAt());
+    if (in.worked_ns > 0) in.worked_ns += path.retargetedAt() - before;
+    out.t_source_ns = in.landmarks.t_capture_ns;
+    publish(in);
+    const std::int64_t gone = monotonicNow();
+    path.learn();
+    learning_meter.add(monotonicNow() - gone);
     if (path.mask().state == TrackingState::tracking) ++faces;
     if (before - noted_ns > kReportInterval_ns) {
       noted_ns = before;
@@ -298,51 +308,47 @@ void Live::State::track() {
       const std::lock_guard lock(mutex);
       if (faces > 0) neutral = std::move(known);
     }
-    std::swap(out.landmarks, in.landmarks);
-    out.mask = path.mask();
-    std::swap(out.avatar, path.avatar());
-    if (options.keep_images) std::swap(out.image, in.image);
-    out.t_shown_ns = in.t_shown_ns;
-    out.arrived_ns = in.arrived_ns;
-    out.worked_ns = in.worked_ns + path.retargetedAt() - before;
-    if (!shown.put(out)) break;
-    const std::int64_t gone = monotonicNow();
-    path.learn();
-    learning_meter.add(monotonicNow() - gone);
+    if (options.look) {
+      std::swap(out.landmarks, in.landmarks);
+      out.mask = path.mask();
+      std::swap(out.avatar, path.avatar());
+      if (options.keep_images) std::swap(out.image, in.image);
+      if (!sent.put(out)) break;
+    }
   }
   if (faces > 0) {
     const std::lock_guard lock(mutex);
     neutral = path.neutral();
   }
-  shown.close();
+  sent.close();
 }
 
-void Live::State::publish() {
-  Shown item;
+// Encodes and sends here, while the mesh is still in this processor's cache and no other thread has to be woken.
+void Live::State::publish(Found& item) {
+  const std::int64_t before = monotonicNow();
+  if (take != nullptr) (void)take->append(item.landmarks, source_name);
+  item.landmarks.t_capture_ns = path.mask().t_capture_ns = path.avatar().t_capture_ns = item.t_shown_ns;
+  publisher.send(item.landmarks, path.mask(), path.avatar());
+  const std::int64_t now = monotonicNow();
+  publish_meter.add(now - before);
+  if (item.worked_ns > 0) work_meter.add(item.worked_ns + now - before);
+  whole_meter.add(now - item.arrived_ns);
+  ++frames_sent;
+}
+
+// Tells how it goes twice a second, and shows what has been sent to those who look.
+void Live::State::show() {
+  Sent item;
   std::int64_t next_report = 0;
   for (;;) {
-    const auto taken = shown.take(item, kPatience);
-    if (taken == Slot<Shown>::Taken::closed) break;
+    const auto taken = sent.take(item, kPatience);
+    if (taken == Slot<Sent>::Taken::closed) break;
     if (const std::int64_t now = monotonicNow(); now >= next_report) {
       next_report = now + kReportInterval_ns;
       sendReport(protocol::PipelineState::running);
     }
-    if (taken == Slot<Shown>::Taken::nothing) continue;
-    const std::int64_t before = monotonicNow();
-    if (take != nullptr) (void)take->append(item.landmarks, source_name);
-    const std::int64_t t_source_ns = item.landmarks.t_capture_ns;
-    item.landmarks.t_capture_ns = item.mask.t_capture_ns = item.avatar.t_capture_ns = item.t_shown_ns;
-    publisher.push(item.landmarks);
-    publisher.push(item.mask);
-    publisher.push(item.avatar);
-    publisher.flush();
-    const std::int64_t sent = monotonicNow();
-    publish_meter.add(sent - before);
-    if (item.worked_ns > 0 && input.images) work_meter.add(item.worked_ns + sent - before);
-    whole_meter.add(sent - item.arrived_ns);
-    ++frames_sent;
-    if (options.look)
-      options.look({input.images ? &item.image : nullptr, item.landmarks, item.mask, item.avatar, t_source_ns});
+    if (taken == Slot<Sent>::Taken::nothing) continue;
+    options.look({input.images ? &item.image : nullptr, item.landmarks, item.mask, item.avatar, item.t_source_ns});
   }
   sendReport(protocol::PipelineState::no_signal);
   const std::lock_guard lock(mutex);
@@ -365,7 +371,7 @@ LiveReport Live::State::makeReport() const {
   add("tracker", tracker_meter, found.replaced(), found.waiting());
   add("retarget", retarget_meter, 0, 0);
   add("learning", learning_meter, 0, 0);
-  add("publish", publish_meter, shown.replaced(), shown.waiting());
+  add("publish", publish_meter, 0, 0);
   if (input.images) add("all but networks", work_meter, 0, 0);
   add("arrival to sent", whole_meter, 0, 0);
   out.source = source;
@@ -430,7 +436,7 @@ void Live::start() {
     s.run(&State::captureDatagrams);
   }
   s.run(&State::track);
-  s.run(&State::publish);
+  s.run(&State::show);
 }
 
 bool Live::waitForEnd(std::chrono::milliseconds timeout) {

@@ -1,9 +1,10 @@
 // Live: pictures or landmarks in, avatar frames out, one thread per stage:
 //
-//   capture -> detection -> tracker + retarget -> publish
+//   capture -> detection -> tracker + retarget + publish -> show
 //
-// joined by slots (slot.h). Datagrams skip the detection. Stopping has two passes: all slots are closed, so that no
-// stage waits for another, then the threads are joined and everything is destroyed.
+// joined by slots (slot.h); the last one reports how it goes and shows what was sent. Datagrams skip the detection.
+// Stopping has two passes: all slots are closed, so that no stage waits for another, then the threads are joined and
+// everything is destroyed.
 #pragma once
 
 #include <cstdint>
@@ -46,8 +47,11 @@ struct LiveOptions {
   bool every_frame = false;  // stages wait for each other and nothing is dropped
   TrackingOptions tracking;
   bool mesh = true;
+  // The mesh is deformed only while a subscriber has asked for it. False: always, for those who `look` at it.
+  bool mesh_on_demand = false;
   double calibration_s = 1.0;  // how long a re-calibration looks at the face at rest
-  // Called from the publish thread after a frame has been handed to the publisher.
+  // Called from a thread of its own after a frame has been sent. Live, one who looks slowly sees the newest frames
+  // only.
   std::function<void(const LiveFrame&)> look;
   bool keep_images = false;  // `look` wants the image
 };
