@@ -43,4 +43,18 @@ void setHeadPose(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& transla
   out.observed = true;
 }
 
+void mixHeadPose(const HeadPose& from, const HeadPose& to, float share, HeadPose& out) {
+  const auto turn = [](const HeadPose& pose) {
+    return Eigen::Quaterniond(pose.rotation[3], pose.rotation[0], pose.rotation[1], pose.rotation[2]);
+  };
+  Eigen::Vector3d translation;
+  for (Eigen::Index c = 0; c < 3; ++c) {
+    const auto i = static_cast<std::size_t>(c);
+    translation[c] = from.translation_mm[i] + share * (to.translation_mm[i] - from.translation_mm[i]);
+  }
+  const bool observed = out.observed;
+  setHeadPose(turn(from).slerp(share, turn(to)).normalized().toRotationMatrix(), translation, out);
+  out.observed = observed;
+}
+
 }  // namespace volto::tracker

@@ -33,4 +33,7 @@ HeadAngles headAngles(const Eigen::Matrix3d& rotation);
 // Fills quaternion (w >= 0), angles, translation and `observed = true`.
 void setHeadPose(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation_camera_mm, HeadPose& out);
 
+// From one pose (0) to the other (1), the shorter way; angles as those of the quaternion. `observed` is left alone.
+void mixHeadPose(const HeadPose& from, const HeadPose& to, float share, HeadPose& out);
+
 }  // namespace volto::tracker

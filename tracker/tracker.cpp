@@ -133,6 +133,7 @@ struct Tracker::State {
   void measure(const LandmarkFrame& in, double dt_s, MaskFrame& out);
   void lose(double dt_s, MaskFrame& out);
   void blendIn(double dt_s, MaskFrame& out);
+  HeadPose restingHead(float left) const;
 
   TrackerOptions options;
   const rig::ExpressionTable* table;
@@ -166,6 +167,7 @@ struct Tracker::State {
   bool ever_shown = false;
   double lost_s = 0;
   double back_s = kReturn_s;  // since the face came back
+  double away_s = 0;          // how long it had been lost
   MaskFrame before_return;
 };
 
@@ -308,8 +310,7 @@ void Tracker::State::lose(double dt_s, MaskFrame& out) {
     out.state = TrackingState::no_face;
     for (auto& d : out.displacement_fapu) d.fill(0);
     out.arkit_weights.fill(0);
-    out.head = last_good.head;
-    out.head.observed = false;
+    out.head = restingHead(0);
     return;
   }
   const double into_ease = options.ease_s > 0 ? (lost_s - options.hold_s) / options.ease_s : 1;
@@ -318,8 +319,18 @@ void Tracker::State::lose(double dt_s, MaskFrame& out) {
   const auto left = static_cast<float>(1 - share * share * (3 - 2 * share));
   static const MaskFrame neutral;
   mixExpression(neutral, last_good, left, out);
-  out.head = last_good.head;
-  out.head.observed = false;
+  out.head = restingHead(left);
+}
+
+// Of a lost face: turned as it was seen last by the share `left` of it, where it was.
+HeadPose Tracker::State::restingHead(float left) const {
+  HeadPose out = last_good.head;
+  out.observed = false;
+  if (options.keep_head || left >= 1) return out;
+  HeadPose upright;
+  upright.translation_mm = out.translation_mm;
+  mixHeadPose(upright, last_good.head, left, out);
+  return out;
 }
 
 // A face that was lost comes back without a jump.
@@ -328,6 +339,10 @@ void Tracker::State::blendIn(double dt_s, MaskFrame& out) {
   back_s += dt_s;
   const auto share = static_cast<float>(std::clamp(back_s / kReturn_s, 0.0, 1.0));
   mixExpression(before_return, out, share, out);
+  // The head has gone no further than it was given time to: what was away for a moment is followed at once.
+  const auto head_share = static_cast<float>(std::clamp(back_s / std::min(kReturn_s, away_s), 0.0, 1.0));
+  const HeadPose seen_head = out.head;
+  if (head_share < 1) mixHeadPose(before_return.head, seen_head, head_share, out.head);
 }
 
 Tracker::Tracker(const TrackerOptions& options, const rig::ExpressionTable& table)
@@ -392,6 +407,7 @@ void Tracker::push(const LandmarkFrame& in, MaskFrame& out) {
       if (s.ever_shown) {
         s.before_return = s.shown;
         s.back_s = 0;
+        s.away_s = s.lost_s;
       }
     }
     s.tracking = true;

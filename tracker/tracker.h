@@ -47,8 +47,9 @@ struct TrackerOptions {
   double focal_length_px = 0;  // 0: as the input says, else guessed from the image size
   double smoothing = 1.0;      // 0: no filter; more = smoother and later. Scales all regions.
   RegionSmoothing regions{};
-  double hold_s = 0.2;         // a lost face: the last good expression is held so long ...
-  double ease_s = 0.5;         // ... and then led back to neutral in so long
+  double hold_s = 0.2;     // a lost face: the last good expression and pose are held so long ...
+  double ease_s = 0.5;     // ... and then led back to neutral and upright in so long
+  bool keep_head = false;  // ... but the head stays turned as it was seen last
   // The landmarks come from a detector that looked at pixels (tracker/detector_noise.h): what people usually do counts
   // for more against its noise and bias, and the lids' range is learned from blinks (tracker/lid_range.h).
   bool from_pixels = false;

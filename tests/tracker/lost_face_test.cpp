@@ -48,7 +48,7 @@ class Smiling : public ::testing::Test {
 TEST_F(Smiling, ALostFaceIsHeldThenEasedToNeutral) {
   const float before = weightOf(mask, "mouthSmileLeft");
   ASSERT_GT(before, 0.5);
-  const float yaw = mask.head.yaw_rad;
+  const auto place = mask.head.translation_mm;
   for (int i = 0; i < 5; ++i) {
     nobody();
     EXPECT_EQ(mask.state, TrackingState::holding);
@@ -66,7 +66,7 @@ TEST_F(Smiling, ALostFaceIsHeldThenEasedToNeutral) {
   EXPECT_TRUE(eased);
   EXPECT_EQ(mask.state, TrackingState::no_face);
   EXPECT_EQ(mask.confidence, 0);
-  EXPECT_EQ(mask.head.yaw_rad, yaw) << "the head stays where it was seen last";
+  EXPECT_EQ(mask.head.translation_mm, place) << "the head stays where it was seen last";
   EXPECT_FALSE(mask.head.observed);
   for (const float w : mask.arkit_weights) EXPECT_EQ(w, 0);
   for (const auto& d : mask.displacement_fapu) EXPECT_EQ(d, (std::array<float, 3>{0, 0, 0}));
@@ -82,6 +82,31 @@ TEST_F(Smiling, AFaceThatComesBackIsBlendedIn) {
     last = weightOf(mask, "mouthSmileLeft");
   }
   EXPECT_GT(last, 0.6);
+}
+
+TEST_F(Smiling, ALostFaceThatWasTurnedGoesBackUprightAndReturnsWithoutAJump) {
+  const test::HeadMotion turned{.yaw_deg = 35, .pitch_deg = 10, .roll_deg = -15};
+  for (const bool keep : {false, true}) {
+    TrackerOptions wanted = options;
+    wanted.keep_head = keep;
+    tracker = Tracker(wanted);
+    const auto angle = [&] { return 2 * std::acos(std::min(1.0F, mask.head.rotation[3])) * 180 / 3.14159F; };
+    for (int i = 0; i < 30; ++i) push(actor.frame(time_s, {}, turned));
+    const float seen = angle();
+    ASSERT_GT(seen, 25);
+    float last = seen;
+    const auto noJump = [&](const char* when) {
+      EXPECT_LT(std::abs(angle() - last), 7.0F) << when << ", degrees in a frame";
+      last = angle();
+    };
+    for (int i = 0; i < 40; ++i) nobody(), noJump("going");
+    EXPECT_NEAR(angle(), keep ? seen : 0, 0.1F);
+    EXPECT_EQ(mask.head.yaw_rad == 0, !keep);
+    EXPECT_FALSE(mask.head.observed);
+    for (int i = 0; i < 30; ++i) push(actor.frame(time_s, {}, turned)), noJump("coming back");
+    EXPECT_TRUE(mask.head.observed);
+    EXPECT_NEAR(angle(), seen, 2);
+  }
 }
 
 TEST_F(Smiling, TimeThatDoesNotAdvanceIsAFrameWithoutFace) {

@@ -54,6 +54,8 @@ struct Options {
   bool realtime = false, loop = false;
   double smoothing = 1.0, focal_length_px = 0;
   tracker::RegionSmoothing regions{.head = 1.0};
+  double hold_s = 0.2, ease_s = 0.5;
+  bool keep_head = false;
   std::string profile;
   std::string record;
   bool force = false;
@@ -207,6 +209,9 @@ int run(const Options& options) {
   live_options.tracking.tracker.smoothing = options.smoothing;
   live_options.tracking.tracker.regions = options.regions;
   live_options.tracking.tracker.focal_length_px = options.focal_length_px;
+  live_options.tracking.tracker.hold_s = options.hold_s;
+  live_options.tracking.tracker.ease_s = options.ease_s;
+  live_options.tracking.tracker.keep_head = options.keep_head;
   std::error_code ignored;
   if (!options.profile.empty() && std::filesystem::exists(options.profile, ignored))
     live_options.tracking.neutral = pipeline::readProfile(options.profile);
@@ -321,6 +326,14 @@ RunVerb defineRun(CLI::App& app) {
                  "focal length of the camera in pixels (default: guessed from the picture's size)")
       ->type_name("PX")
       ->check(CLI::Range(0.0, 1e6));
+  app.add_option("--hold", options->hold_s,
+                 "a face that is lost: its last expression and pose stay for so long (default 0.2)")
+      ->type_name("SECONDS")
+      ->check(CLI::Range(0.0, 86400.0));
+  app.add_option("--ease", options->ease_s, "... and then go back to neutral and upright within so long (default 0.5)")
+      ->type_name("SECONDS")
+      ->check(CLI::Range(0.0, 86400.0));
+  app.add_flag("--keep-head", options->keep_head, "... but the head stays turned as it was seen last");
   app.add_option("--profile", options->profile,
                  "the actor's profile: read if it is there, written at the end; kill -USR1 takes the face of the next "
                  "second as the face at rest")
