@@ -80,6 +80,22 @@ TEST_F(ShapeSets, ARecordingDrivesTheShapesOfItsOwnSet) {
   EXPECT_NEAR(number(row, "jawOpen"), 0.5, 0.05);
 }
 
+TEST_F(ShapeSets, SubscribersGetTheNamesAndWeightsOfAnotherSet) {
+  script("hold 0.1\nto 0.1: eyeBlinkLeft 0.8, eyeBlinkRight 0.8\nhold 0.6\n");
+  ASSERT_EQ(volto({"animate", path("s.script"), "--rig", rig(), "--take", path("s.take")}).status, 0);
+  Process listener({listenProgram(), endpoint("names"), "--wait", "30", "--json", "--count", "30"});
+  const Finished replayed = volto({"replay", path("s.take"), "--rig", rig(), "--weights-as", "vrm1", "--publish",
+                                   endpoint("names"), "--wait", "20", "--lossless"});
+  EXPECT_EQ(replayed.status, 0) << replayed.err;
+  const Finished heard = listener.wait();
+  ASSERT_EQ(heard.status, 0) << heard.err;
+  const std::string last = heard.out.substr(heard.out.rfind("\n{") + 1);
+  EXPECT_EQ(last.find("eyeBlinkLeft"), std::string::npos) << last;
+  const std::size_t at = last.find("\"blinkLeft\":");
+  ASSERT_NE(at, std::string::npos) << last;
+  EXPECT_NEAR(std::stod(last.substr(at + 12)), 0.8, 0.1) << last;
+}
+
 TEST_F(ShapeSets, WhatIsNoSetIsNamed) {
   script("to 0.1: jawOpen 1\n");
   const auto complaint = [&](std::vector<std::string> arguments, int status) {
@@ -88,6 +104,11 @@ TEST_F(ShapeSets, WhatIsNoSetIsNamed) {
     EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
     return run.err;
   };
+  const auto live = [&](const std::string& flag, const std::string& set) {
+    return complaint({"run", "udp://127.0.0.1:11998", "--rig", rig(), flag, set}, 2);
+  };
+  EXPECT_NE(live("--weights-as", "vmr1").find("did you mean vrm1?"), std::string::npos);
+  EXPECT_NE(live("--shapes-mean", "ict").find("--weights-as"), std::string::npos);
   const std::vector<std::string> animate{"animate", path("s.script"), "--rig", rig(), "--csv", path("w.csv")};
   const auto with = [&](std::vector<std::string> more) {
     more.insert(more.begin(), animate.begin(), animate.end());

@@ -16,6 +16,7 @@
 #include "tools/cli/stop_signal.h"
 #include "tools/cli/tracking_flags.h"
 #include "tools/cli/verb.h"
+#include "tools/cli/weight_names.h"
 #include "tools/pipeline/character.h"
 #include "tools/pipeline/replay.h"
 
@@ -33,6 +34,7 @@ struct Options {
   double wait_s = 0;
   bool loop = false;
   bool stats = false;
+  WeightNameFlags names;
   bool no_mesh = false;
   bool lossless = false;
   TrackingFlags tracking;
@@ -83,6 +85,13 @@ int run(const Options& options) {
   pipeline::FramePath path(rig, trackingOptions(options.tracking, performance),
                            {.mesh = !options.no_mesh, .weights = true});
 
+  std::optional<rig::ShapeTranslation> translation = translationFor(options.names, rig);
+  protocol::Character character = pipeline::characterOf(rig, !options.no_mesh);
+  if (translation) {
+    rename(*translation, character);
+    path.speakAs(std::move(*translation));
+  }
+
   protocol::PublisherOptions publisher_options;
   publisher_options.endpoint = options.endpoint;
   publisher_options.source = protocol::topicNameFrom(performance.source);
@@ -91,7 +100,7 @@ int run(const Options& options) {
   // replay.
   publisher_options.send_high_water_mark = 16;
   protocol::Publisher publisher(publisher_options);
-  publisher.setCharacter(pipeline::characterOf(rig, !options.no_mesh));
+  publisher.setCharacter(character);
 
   // In small steps, so that a signal is heard. Without a subscriber it goes on: nobody has to listen.
   waitForFirstSubscriber(publisher, options.wait_s);
@@ -125,6 +134,7 @@ RunVerb defineReplay(CLI::App& app) {
       ->type_name("SECONDS")
       ->check(CLI::Range(0.0, 86400.0));
   app.add_flag("--stats", options->stats, "at the end, the time that each stage took");
+  addWeightNameFlags(app, options->names);
   addTrackingFlags(app, options->tracking);
   return [options] { return run(*options); };
 }

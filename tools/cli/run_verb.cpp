@@ -29,6 +29,7 @@
 #include "tools/cli/read_input.h"
 #include "tools/cli/stop_signal.h"
 #include "tools/cli/verb.h"
+#include "tools/cli/weight_names.h"
 #include "tools/pipeline/character.h"
 #include "tools/pipeline/live.h"
 #include "tools/pipeline/preview.h"
@@ -61,6 +62,7 @@ struct Options {
   bool force = false;
   std::string preview, sheet;
   bool window = false;
+  WeightNameFlags names;
   bool no_mesh = false, stats = false;
   int threads = 0;
   double wait_s = 0, seconds = 0;
@@ -206,6 +208,7 @@ int run(const Options& options) {
   const rig::Rig rig = rig::readRig(options.rig);
 
   pipeline::LiveOptions live_options;
+  live_options.translation = translationFor(options.names, rig);
   live_options.tracking.tracker.smoothing = options.smoothing;
   live_options.tracking.tracker.regions = options.regions;
   live_options.tracking.tracker.focal_length_px = options.focal_length_px;
@@ -244,7 +247,9 @@ int run(const Options& options) {
   publisher_options.source = protocol::topicNameFrom(input.name);
   publisher_options.when_full = live_options.every_frame ? protocol::WhenFull::wait : protocol::WhenFull::newest_wins;
   protocol::Publisher publisher(publisher_options);
-  publisher.setCharacter(pipeline::characterOf(rig, !options.no_mesh));
+  protocol::Character character = pipeline::characterOf(rig, !options.no_mesh);
+  if (live_options.translation) rename(*live_options.translation, character);
+  publisher.setCharacter(character);
 
   std::optional<protocol::TakeWriter> take;
   if (!options.record.empty()) {
@@ -346,6 +351,7 @@ RunVerb defineRun(CLI::App& app) {
   app.add_flag("--window", options->window, "the same in a window");
   app.add_option("--sheet", options->sheet, "at the end: moments of the performance, face beside avatar")
       ->type_name("F.png");
+  addWeightNameFlags(app, options->names);
   app.add_flag("--no-mesh", options->no_mesh, "weights only: neither compute nor publish the deformed mesh");
   app.add_option(
          "--threads", options->threads,

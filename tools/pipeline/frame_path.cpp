@@ -37,12 +37,14 @@ FramePath::FramePath(const rig::Rig& rig, TrackingOptions tracking, const retarg
 void FramePath::push(const LandmarkFrame& in) {
   tracking_.push(in, mask_);
   retarget();
+  translate();
 }
 
 void FramePath::push(const Performance& performance, std::size_t frame) {
   tracking_.push(performance, frame, mask_);
   retarget();
   if (performance.format == PerformanceFormat::live_link_csv) passWeightsOn();
+  translate();
 }
 
 void FramePath::retarget() {
@@ -58,6 +60,15 @@ void FramePath::passWeightsOn() {
       avatar_.observed[shape] = mask_.arkit_observed[*index] ? 1 : 0;
     }
   }
+}
+
+void FramePath::translate() {
+  if (!translation_) return;
+  std::swap(avatar_.weights, untranslated_.weights);
+  std::swap(avatar_.observed, untranslated_.observed);
+  avatar_.weights.resize(translation_->to().shapes().size());
+  avatar_.observed.resize(avatar_.weights.size());
+  translation_->apply(untranslated_.weights, untranslated_.observed, avatar_.weights, avatar_.observed);
 }
 
 void FramePath::restart() {

@@ -12,6 +12,7 @@
 #include "frames/mask_frame.h"
 #include "retarget/retargeter.h"
 #include "rig/rig.h"
+#include "rig/shape_translation.h"
 #include "tools/pipeline/performance.h"
 #include "tracker/tracker.h"
 
@@ -64,6 +65,8 @@ class FramePath {
   void setNeutral(const tracker::NeutralFace& neutral) { tracking_.setNeutral(neutral); }
   tracker::NeutralFace neutral() const { return tracking_.neutral(); }
   void setMesh(bool mesh) { retargeter_.setMesh(mesh); }  // see retarget/retargeter.h
+  // From now on the avatar's weights are those of another set. The mesh stays as it is.
+  void speakAs(rig::ShapeTranslation translation) { translation_ = std::move(translation); }
 
   // Of the last push; valid until the next.
   MaskFrame& mask() { return mask_; }
@@ -75,9 +78,12 @@ class FramePath {
  private:
   void retarget();
   void passWeightsOn();
+  void translate();
 
   Tracking tracking_;
   retarget::Retargeter retargeter_;
+  std::optional<rig::ShapeTranslation> translation_;
+  AvatarFrame untranslated_;                             // weights and observed only
   std::vector<std::optional<std::size_t>> arkit_index_;  // one per blendshape of the character
   MaskFrame mask_;
   AvatarFrame avatar_;

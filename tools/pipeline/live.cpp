@@ -80,7 +80,9 @@ struct Live::State {
         path(rig, o.tracking, {.mesh = o.mesh, .weights = true}),
         captured(policy(), room()),
         found(policy(), room()),
-        sent(policy()) {}
+        sent(policy()) {
+    if (options.translation) path.speakAs(*options.translation);
+  }
 
   SlotPolicy policy() const { return options.every_frame ? SlotPolicy::every_frame : SlotPolicy::newest_wins; }
   std::size_t room() const { return input.live || options.every_frame ? 1 : kFileRoom; }

@@ -46,6 +46,7 @@ struct LiveFrame {
 struct LiveOptions {
   bool every_frame = false;  // stages wait for each other and nothing is dropped
   TrackingOptions tracking;
+  std::optional<rig::ShapeTranslation> translation;  // weights in the words of another set; the character's names too
   bool mesh = true;
   // The mesh is deformed only while a subscriber has asked for it. False: always, for those who `look` at it.
   bool mesh_on_demand = false;
