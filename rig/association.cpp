@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kRayLimitEs = 0.4;
 constexpr double kNearEs = 0.03;
+constexpr std::size_t kChunk = 512;
 
 struct MaskFace {
   Eigen::Vector3d a, ab, ac, normal;
@@ -53,52 +54,47 @@ bool intersect(const MaskFace& face, const Eigen::Vector3d& p, const Eigen::Vect
   return true;
 }
 
+// A place of the skin: a vertex, or somewhere between two.
+struct Place {
+  Eigen::Vector3d at, normal;
+  std::array<float, kFeaturePointCount> distance;  // along the skin, from the feature points
+};
+
+// Where the mask covers a place, if it does.
+struct Cover {
+  std::int16_t triangle = -1;
+  bool by_ray = false;
+  SlitSide side = SlitSide::none;
+  std::array<double, 3> barycentric{};
+
+  bool found() const { return triangle >= 0; }
+  // Skin that belongs together: covered from the same side of the same slit, or not covered.
+  bool sameKind(const Cover& other) const { return found() == other.found() && side == other.side; }
+};
+
 class Associator {
  public:
   Associator(const Mesh& mesh, const Skin& skin, const MaskGeometry& mask, double eye_separation, SkinAssociation& out)
       : mesh_(mesh), skin_(skin), mask_(mask), es_(eye_separation), faces_(maskFaces(mask)), out_(out) {}
 
-  // The closest triangle that the vertex's normal meets, that faces the same way, on the same lip or lid, and that is
-  // near along the skin.
-  bool byRay(std::uint32_t v) {
-    const Eigen::Vector3d p = mesh_.positions.row(v), n = skin_.normals.row(v);
-    if (n.squaredNorm() == 0) return false;
-    double best = kRayLimitEs * es_;
-    bool found = false;
-    for (std::size_t t = 0; t < faces_.size(); ++t) {
-      Hit hit;
-      if (!intersect(faces_[t], p, n, hit) || hit.distance >= best) continue;
-      if (onOtherSide(v, faces_[t].side) || !nearAlongSkin(v, faces_[t], hit)) continue;
-      best = hit.distance;
-      found = true;
-      out_.triangle[v] = static_cast<std::int16_t>(t);
-      out_.barycentric[v] = hit.barycentric;
-      out_.side[v] = faces_[t].side;
-    }
-    if (found) out_.kind[v] = AssociationKind::ray;
-    return found;
-  }
+  Cover cover(std::uint32_t v) const { return coverAt(placeOf(v)); }
 
-  // Where the normal just misses the mask (at its outline, at the margins of lids and lips) but the mask is there all
-  // the same: the nearest point of it, under the same conditions.
-  bool byNearness(std::uint32_t v) {
-    const Eigen::Vector3d p = mesh_.positions.row(v), n = skin_.normals.row(v);
-    double best = kNearEs * es_;
-    bool found = false;
-    for (std::size_t t = 0; t < faces_.size(); ++t) {
-      const MaskFace& face = faces_[t];
-      if (n.dot(face.normal) <= 0) continue;
-      const SurfacePoint nearest = closestPointOnTriangle(p, face.a, face.a + face.ab, face.a + face.ac);
-      const Hit hit{nearest.distance, nearest.barycentric};
-      if (nearest.distance >= best || onOtherSide(v, face.side) || !nearAlongSkin(v, face, hit)) continue;
-      best = nearest.distance;
-      found = true;
-      out_.triangle[v] = static_cast<std::int16_t>(t);
-      out_.barycentric[v] = nearest.barycentric;
-      out_.side[v] = face.side;
+  // How far from `a` towards its neighbour `b` what `a` is goes on, as a share of the edge.
+  double extent(std::uint32_t a, const Cover& of_a, std::uint32_t b) const {
+    const Place from = placeOf(a), to = placeOf(b);
+    const auto length = static_cast<float>((to.at - from.at).norm());
+    double same = 0, other = 1;
+    for (int halving = 0; halving < 6; ++halving) {
+      const double t = 0.5 * (same + other);
+      Place place;
+      place.at = (1 - t) * from.at + t * to.at;
+      place.normal = ((1 - t) * from.normal + t * to.normal).normalized();
+      for (std::size_t p = 0; p < kFeaturePointCount; ++p)
+        place.distance[p] = std::min(from.distance[p] + static_cast<float>(t) * length,
+                                     to.distance[p] + static_cast<float>(1 - t) * length);
+      (coverAt(place).sameKind(of_a) ? same : other) = t;
     }
-    if (found) out_.kind[v] = AssociationKind::geodesic;
-    return found;
+    return 0.5 * (same + other);
   }
 
   // The triangle at the feature point with the shortest path; of those, the one whose other points are nearest.
@@ -120,22 +116,67 @@ class Associator {
   }
 
  private:
-  bool onOtherSide(std::uint32_t v, SlitSide side) const {
+  Place placeOf(std::uint32_t v) const {
+    Place place{mesh_.positions.row(v), skin_.normals.row(v), {}};
+    const auto row = out_.point_distance.row(v);
+    std::copy(row.data(), row.data() + kFeaturePointCount, place.distance.begin());
+    return place;
+  }
+
+  Cover coverAt(const Place& place) const {
+    const Cover cover = byRay(place);
+    return cover.found() ? cover : byNearness(place);
+  }
+
+  // The closest triangle that the place's normal meets, that faces the same way, on the same lip or lid, and that is
+  // near along the skin.
+  Cover byRay(const Place& place) const {
+    Cover cover;
+    if (!(place.normal.squaredNorm() > 0)) return cover;
+    double best = kRayLimitEs * es_;
+    for (std::size_t t = 0; t < faces_.size(); ++t) {
+      Hit hit;
+      if (!intersect(faces_[t], place.at, place.normal, hit) || hit.distance >= best) continue;
+      if (onOtherSide(place, faces_[t].side) || !nearAlongSkin(place, faces_[t], hit)) continue;
+      best = hit.distance;
+      cover = {static_cast<std::int16_t>(t), true, faces_[t].side, hit.barycentric};
+    }
+    return cover;
+  }
+
+  // Where the normal just misses the mask (at its outline, at the margins of lids and lips) but the mask is there all
+  // the same: the nearest point of it, under the same conditions.
+  Cover byNearness(const Place& place) const {
+    Cover cover;
+    double best = kNearEs * es_;
+    for (std::size_t t = 0; t < faces_.size(); ++t) {
+      const MaskFace& face = faces_[t];
+      if (place.normal.dot(face.normal) <= 0) continue;
+      const SurfacePoint nearest = closestPointOnTriangle(place.at, face.a, face.a + face.ab, face.a + face.ac);
+      const Hit hit{nearest.distance, nearest.barycentric};
+      if (nearest.distance >= best || onOtherSide(place, face.side) || !nearAlongSkin(place, face, hit)) continue;
+      best = nearest.distance;
+      cover = {static_cast<std::int16_t>(t), false, face.side, nearest.barycentric};
+    }
+    return cover;
+  }
+
+  bool onOtherSide(const Place& place, SlitSide side) const {
     if (side == SlitSide::none) return false;
     float own = kUnreached, other = kUnreached;
     for (std::size_t p = 0; p < kFeaturePointCount; ++p) {
       const SlitSide of_point = mask_.point_side[p];
-      if (of_point == side) own = std::min(own, out_.point_distance(v, static_cast<Eigen::Index>(p)));
-      if (opposite(of_point, side)) other = std::min(other, out_.point_distance(v, static_cast<Eigen::Index>(p)));
+      if (of_point == side) own = std::min(own, place.distance[p]);
+      if (opposite(of_point, side)) other = std::min(other, place.distance[p]);
     }
     return other < 0.6F * own;  // beside a corner both are about as near, and either will do
   }
 
-  bool nearAlongSkin(std::uint32_t v, const MaskFace& face, const Hit& hit) const {
+  bool nearAlongSkin(const Place& place, const MaskFace& face, const Hit& hit) const {
     const Eigen::Vector3d q = face.a + hit.barycentric[1] * face.ab + hit.barycentric[2] * face.ac;
     for (const std::uint16_t p : face.points) {
       const double air = (mask_.points.row(p).transpose() - q).norm();
-      if (out_.point_distance(v, p) > 2.2 * air + 2.0 * hit.distance + 0.08 * es_) return false;
+      if (place.distance[p] > 2.2 * air + 2.0 * hit.distance + 0.08 * es_) return false;
     }
     return true;
   }
@@ -147,6 +188,33 @@ class Associator {
   std::vector<MaskFace> faces_;
   SkinAssociation& out_;
 };
+
+// In the corner of an eye or of the mouth rays of some folds meet the opposite side. A lip or lid is one piece with the
+// points on it; what is not connected to them is covered by neither side.
+void dropIslands(const Skin& skin, const MaskGeometry& mask, const SkinPoints& on_skin, std::vector<Cover>& covers) {
+  std::vector<std::uint8_t> connected(covers.size(), 0);
+  std::vector<std::uint32_t> stack;
+  for (std::size_t p = 0; p < on_skin.size(); ++p) {
+    const SlitSide side = mask.point_side[p];
+    if (side == SlitSide::none) continue;
+    for (const GeodesicSource& s : on_skin[p].around) {
+      stack.push_back(s.vertex);
+      connected[s.vertex] = 1;
+    }
+    while (!stack.empty()) {
+      const std::uint32_t v = stack.back();
+      stack.pop_back();
+      for (std::uint32_t e = skin.graph.start[v]; e < skin.graph.start[v + 1]; ++e) {
+        const std::uint32_t u = skin.graph.neighbour[e];
+        if (connected[u] != 0 || !covers[u].found() || covers[u].side != side) continue;
+        connected[u] = 1;
+        stack.push_back(u);
+      }
+    }
+  }
+  for (std::size_t v = 0; v < covers.size(); ++v)
+    if (covers[v].found() && covers[v].side != SlitSide::none && connected[v] == 0) covers[v] = Cover{};
+}
 
 }  // namespace
 
@@ -181,29 +249,48 @@ SkinAssociation associateSkin(const Mesh& mesh, const Skin& skin, const std::vec
   });
 
   Associator associator(mesh, skin, mask, eye_separation, out);
+  const auto isSkin = [&](std::uint32_t v) { return skin.stands(v) && is_skin[skin.component[v]]; };
+  std::vector<Cover> covers(vertices);
+  parallelFor((vertices + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+    for (std::size_t v = chunk * kChunk; v < std::min((chunk + 1) * kChunk, vertices); ++v)
+      if (const auto u = static_cast<std::uint32_t>(v); isSkin(u)) covers[v] = associator.cover(u);
+  });
+  dropIslands(skin, mask, on_skin, covers);
   std::vector<GeodesicSource> covered;
   std::vector<std::uint32_t> left;
-  constexpr std::size_t kChunk = 512;
-  std::vector<std::uint8_t> met(vertices, 0);
-  parallelFor((vertices + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+  for (std::uint32_t v = 0; v < vertices; ++v) {
+    if (!isSkin(v)) continue;
+    const Cover& cover = covers[v];
+    out.on_mask[v] = cover.found();
+    if (!cover.found()) {
+      left.push_back(v);
+      continue;
+    }
+    out.triangle[v] = cover.triangle;
+    out.barycentric[v] = cover.barycentric;
+    out.side[v] = cover.side;
+    out.kind[v] = cover.by_ray ? AssociationKind::ray : AssociationKind::geodesic;
+    covered.push_back({v, 0.0F});
+  }
+  std::vector<std::vector<SkinBorder>> borders((vertices + kChunk - 1) / kChunk);
+  parallelFor(borders.size(), [&](std::size_t chunk) {
     for (std::size_t v = chunk * kChunk; v < std::min((chunk + 1) * kChunk, vertices); ++v) {
-      const auto u = static_cast<std::uint32_t>(v);
-      if (skin.stands(u) && is_skin[skin.component[u]]) met[v] = associator.byRay(u) || associator.byNearness(u) ? 1 : 0;
+      const auto a = static_cast<std::uint32_t>(v);
+      if (!isSkin(a) || !covers[a].found()) continue;
+      for (std::uint32_t e = skin.graph.start[a]; e < skin.graph.start[a + 1]; ++e)
+        if (const std::uint32_t b = skin.graph.neighbour[e]; !covers[a].sameKind(covers[b]))
+          borders[chunk].push_back({a, b, associator.extent(a, covers[a], b), skin.graph.length[e]});
     }
   });
-  for (std::uint32_t v = 0; v < vertices; ++v) {
-    if (!skin.stands(v) || !is_skin[skin.component[v]]) continue;
-    out.on_mask[v] = met[v] != 0;
-    if (out.on_mask[v])
-      covered.push_back({v, 0.0F});
-    else
-      left.push_back(v);
-  }
+  for (const auto& chunk : borders) out.borders.insert(out.borders.end(), chunk.begin(), chunk.end());
   // The feature points themselves always count as covered, whatever their normals do.
   for (const SkinPoint& point : on_skin)
     for (const GeodesicSource& s : point.around)
       if (!out.on_mask[s.vertex]) covered.push_back(s);
-  out.beyond = surfaceDistances(skin.graph, covered, static_cast<float>(fade_out)).distance;
+  for (const SkinBorder& border : out.borders)
+    if (!out.on_mask[border.outside]) covered.push_back({border.outside, border.left()});
+  out.fade_out = static_cast<float>(fade_out);
+  out.beyond = surfaceDistances(skin.graph, covered, out.fade_out).distance;
   std::vector<GeodesicSource> sources;
   std::vector<std::size_t> point_of_source;
   for (std::size_t p = 0; p < on_skin.size(); ++p)

@@ -11,13 +11,16 @@ namespace volto::rig {
 namespace {
 
 constexpr int kMostRounds = 72;
-constexpr int kHeldRounds = 48;  // then what should be held gives way too
-constexpr int kPatience = 48;    // rounds without a better one
+constexpr int kHeldRounds = 48;   // then what should be held gives way too
+constexpr int kPatience = 48;     // rounds without a better one
+constexpr int kGrowthRounds = 8;  // in which the region gets no wider than its folds
+constexpr int kAllGrows = 16;     // from this round on
+constexpr int kSteps = 5;         // of a round
 constexpr float kLeaning = 0.4F;
 constexpr float kFoldCosine = 0.12F;  // a little before a triangle stands at right angles to where it was
 constexpr float kFolded = 0.02F;
-constexpr double kCostOfRelaxed = 0.01;  // of a vertex, in folded triangles
-constexpr float kLeastArea = 0.01F;      // of what it was
+constexpr double kCostOfMoving = 2;  // a vertex by an eye separation, in folded triangles
+constexpr float kLeastArea = 0.01F;  // of what it was
 
 }  // namespace
 
@@ -121,8 +124,7 @@ void PoseLab::setWeights(std::span<const float> weights) {
 
 const std::vector<Position>& PoseLab::evaluate(const DenseDisplacement& extra) {
   for (std::size_t v = 0; v < positions_.size(); ++v)
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      positions_[v][axis] = base_[v][axis] + extra[v].data()[axis];
+    for (std::size_t axis = 0; axis < 3; ++axis) positions_[v][axis] = base_[v][axis] + extra[v].data()[axis];
   for (const ContactGroup& group : contact_groups_) resolveContacts(group.contacts, neutral_, positions_);
   return positions_;
 }
@@ -165,6 +167,9 @@ bool PoseLab::unfold(DenseDisplacement& extra, std::span<const std::uint32_t> he
   std::vector<std::uint32_t> region, copies, seeds;
   std::vector<std::uint8_t> in_region(neutral_.size(), 0), is_held(neutral_.size(), 0);
   for (const std::uint32_t v : held) is_held[skin_.same_as[v]] = 1;
+  // The mask says where its points go; or a fold at a corner of the mouth would take the opening of the jaw back.
+  for (const std::int32_t v : rig_.feature_vertex)
+    if (v >= 0) is_held[skin_.same_as[static_cast<std::uint32_t>(v)]] = 1;
   // Where lips or lids are relaxed, the push of their contact becomes part of the correction: it would be made again on
   // top of itself.
   std::vector<std::uint8_t> kept(rig_.contacts.slits.size(), 0), to_keep(kept);
@@ -182,6 +187,7 @@ bool PoseLab::unfold(DenseDisplacement& extra, std::span<const std::uint32_t> he
     for (std::uint32_t i = triangles_of_start_[v]; i < triangles_of_start_[v + 1]; ++i) suspect(triangles_of_[i]);
   };
   std::vector<Eigen::Vector3f> moved(neutral_.size(), Eigen::Vector3f::Zero()), next;
+  const std::vector<Position> given = positions_;
   DenseDisplacement best = extra;
   std::size_t fewest = std::numeric_limits<std::size_t>::max();
   std::size_t left = fewest;  // by the best
@@ -196,24 +202,27 @@ bool PoseLab::unfold(DenseDisplacement& extra, std::span<const std::uint32_t> he
       folded += upright < kFolded ? 1 : 0;
       for (const std::uint32_t v : triangles_[t]) seeds.push_back(skin_.same_as[v]);
     }
-    if (seeds.empty()) return true;
-    if (round > best_round + kPatience) break;
-    // Folds that do not go away are not worth what relaxing ever more skin around them does to its form.
-    const double cost = static_cast<double>(folded) + kCostOfRelaxed * static_cast<double>(region.size());
+    // The last few folds are not worth what relaxing ever more skin around them does to its form (fold_guard.h opens
+    // them where they are).
+    double cost = static_cast<double>(folded);
+    for (const std::uint32_t v : region)
+      cost += kCostOfMoving / es_ * (at(v) - Eigen::Map<const Eigen::Vector3f>(given[v].data())).norm();
     if (cost < lowest) {
       lowest = cost;
       best = extra;
       left = folded;
     }
+    if (seeds.empty() || round > best_round + kPatience) break;
     if (folded < fewest) {
       fewest = folded;
       best_round = round;
     }
     // The region only grows, so that a fold is not chased to and fro; all of it when a narrow one does not do.
-    if (round >= 12 && round % 8 == 4) seeds.insert(seeds.end(), region.begin(), region.end());
+    const bool all_grows = round >= kAllGrows && round % kGrowthRounds == kGrowthRounds / 2;
+    if (all_grows) seeds.insert(seeds.end(), region.begin(), region.end());
     for (const std::uint32_t v : seeds) {
       addToRegion(v);
-      if (round % 4 != 0) continue;
+      if (round % kGrowthRounds != 0 && !all_grows) continue;
       for (std::uint32_t e = skin_.graph.start[v]; e < skin_.graph.start[v + 1]; ++e)
         addToRegion(skin_.graph.neighbour[e]);
     }
@@ -230,7 +239,7 @@ bool PoseLab::unfold(DenseDisplacement& extra, std::span<const std::uint32_t> he
         moved[skin_.graph.neighbour[e]] = at(skin_.graph.neighbour[e]) - rest(skin_.graph.neighbour[e]);
     }
     next.resize(region.size());
-    for (int step = 0; step < 3; ++step) {
+    for (int step = 0; step < kSteps; ++step) {
       for (std::size_t i = 0; i < region.size(); ++i) {
         const std::uint32_t v = region[i];
         next[i] = moved[v];

@@ -16,6 +16,11 @@ std::size_t edgeIndex(const EdgeGraph& graph, std::uint32_t a, std::uint32_t b) 
                                       : graph.neighbour.size();
 }
 
+// A triangle that is nearly a line has angles of 0 and 180 degrees and cotangents without bounds. Its sides are taken
+// as this part of their mean longer, by which all of them keep the order of length, and the triangle keeps energies
+// that are never negative (Sharp and Crane, "A Laplacian for Nonmanifold Triangle Meshes", section 4.5).
+constexpr double kLeastSlack = 0.01;
+
 class LaplaceAssembly {
  public:
   LaplaceAssembly(const Mesh& mesh, Skin& skin) : mesh_(mesh), skin_(skin) {}
@@ -24,22 +29,32 @@ class LaplaceAssembly {
     if (a == b || b == c || c == a) return;
     const Eigen::Vector3d pa = mesh_.positions.row(a), pb = mesh_.positions.row(b), pc = mesh_.positions.row(c);
     const Eigen::Vector3d cross = (pb - pa).cross(pc - pa);
-    const double twice_area = cross.norm();
-    if (!(twice_area > 0)) return;
     for (const std::uint32_t v : {a, b, c}) {
       skin_.normals.row(v) += share * cross.transpose();
-      skin_.area[v] += share * twice_area / 6;
+      skin_.area[v] += share * cross.norm() / 6;
     }
-    addEdge(b, c, share * 0.5 * (pb - pa).dot(pc - pa) / twice_area);
-    addEdge(c, a, share * 0.5 * (pc - pb).dot(pa - pb) / twice_area);
-    addEdge(a, b, share * 0.5 * (pa - pc).dot(pb - pc) / twice_area);
+    std::array<double, 3> side{(pc - pb).norm(), (pa - pc).norm(), (pb - pa).norm()};  // opposite to each corner
+    const double sum = side[0] + side[1] + side[2], longest = *std::max_element(side.begin(), side.end());
+    if (!(sum > 0)) return;
+    const double missing = kLeastSlack * sum / 3 - (sum - 2 * longest);
+    for (double& s : side) s += std::max(missing, 0.0);
+    const double half = 0.5 * (side[0] + side[1] + side[2]);
+    const double area = std::sqrt(half * (half - side[0]) * (half - side[1]) * (half - side[2]));
+    if (!(area > 0)) return;
+    CotangentTriangle triangle{{a, b, c}, {}};
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double own = side[i] * side[i], next = side[(i + 1) % 3] * side[(i + 1) % 3],
+                   last = side[(i + 2) % 3] * side[(i + 2) % 3];
+      triangle.weight[i] = share * (next + last - own) / (8 * area);
+      addEdge(triangle.vertices[(i + 1) % 3], triangle.vertices[(i + 2) % 3], triangle.weight[i]);
+    }
+    skin_.cotangents.push_back(triangle);
   }
 
  private:
   void addEdge(std::uint32_t a, std::uint32_t b, double weight) {
     const std::size_t ab = edgeIndex(skin_.graph, a, b), ba = edgeIndex(skin_.graph, b, a);
-    if (ab >= skin_.laplacian.size() || ba >= skin_.laplacian.size())
-      return;
+    if (ab >= skin_.laplacian.size() || ba >= skin_.laplacian.size()) return;
     skin_.laplacian[ab] += weight;
     skin_.laplacian[ba] += weight;
   }
@@ -73,7 +88,6 @@ Skin prepareSkin(const Mesh& mesh, const Mesh& polygons, std::vector<std::uint32
       for (std::uint32_t c = 2; c < corners; ++c) assembly.addTriangle(corner(0), corner(c - 1), corner(c), 1.0);
     }
   }
-  for (double& weight : skin.laplacian) weight = std::clamp(weight, 0.02, 20.0);
   for (std::uint32_t v = 0; v < vertices; ++v) {
     const double length = skin.normals.row(v).norm();
     if (length > 0) skin.normals.row(v) /= length;

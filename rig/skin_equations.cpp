@@ -14,7 +14,7 @@ using Sparse = Eigen::SparseMatrix<double>;
 
 // Where bending gives way to tension, in eye separations: the reach of what a border of the data says about the slope
 // beyond it. Bending alone goes on with that slope deep into the mouth, and a different mesh has a different slope.
-constexpr double kTensionLength = 0.04;
+constexpr double kTensionLength = 0.08;
 // Over what length, in eye separations, a tied vertex may differ from the place that it is tied to.
 constexpr double kTieLength = 0.15;
 
@@ -69,22 +69,27 @@ SkinEquations::SkinEquations(const Skin& skin, std::span<const std::int32_t> unk
     state_->data_scale[row] = areaOf(v) * (data_weight[row] + 1e-9);
     entries.emplace_back(unknown[v], unknown[v], state_->data_scale[row]);
   }
-  // Tension along edges, as far as their ends have no data.
-  const auto bare = [&](std::int32_t u) { return data_weight[static_cast<std::size_t>(u)] > 0 ? 0.0 : 0.5; };
-  for (std::uint32_t v = 0; v < vertices; ++v) {
-    if (!skin.stands(v) || unknown[v] < 0) continue;
-    for (std::uint32_t e = skin.graph.start[v]; e < skin.graph.start[v + 1]; ++e) {
-      const std::int32_t u = unknown[skin.graph.neighbour[e]];
-      if (u < 0) continue;
-      const double pull = (bare(unknown[v]) + bare(u)) * skin.laplacian[e] / (kTensionLength * kTensionLength);
-      if (!(pull > 0)) continue;
-      entries.emplace_back(unknown[v], unknown[v], pull);
-      if (u < unknown[v]) entries.emplace_back(unknown[v], u, -pull);
+  // Tension, as far as a triangle's corners have no data.
+  for (const CotangentTriangle& triangle : skin.cotangents) {
+    std::array<std::int32_t, 3> at{};
+    double bare = 0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      at[i] = unknown[triangle.vertices[i]];
+      if (at[i] >= 0 && !(data_weight[static_cast<std::size_t>(at[i])] > 0)) bare += 1.0 / 3;
+    }
+    if (!(bare > 0) || at[0] < 0 || at[1] < 0 || at[2] < 0) continue;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double pull = bare * triangle.weight[i] / (kTensionLength * kTensionLength);
+      const std::int32_t u = at[(i + 1) % 3], v = at[(i + 2) % 3];
+      entries.emplace_back(u, u, pull);
+      entries.emplace_back(v, v, pull);
+      entries.emplace_back(std::max(u, v), std::min(u, v), -pull);
     }
   }
   for (const SkinTie& tie : ties) {
     const double weight = tie.share * areaOf(tie.vertex) * std::pow(2 * 3.14159265358979 / kTieLength, 4);
-    const std::array<std::int32_t, 4> at{unknown[tie.vertex], unknown[tie.to[0]], unknown[tie.to[1]], unknown[tie.to[2]]};
+    const std::array<std::int32_t, 4> at{unknown[tie.vertex], unknown[tie.to[0]], unknown[tie.to[1]],
+                                         unknown[tie.to[2]]};
     const std::array<double, 4> of{1, -tie.weight[0], -tie.weight[1], -tie.weight[2]};
     if (std::any_of(at.begin(), at.end(), [](std::int32_t u) { return u < 0; })) continue;
     for (std::size_t i = 0; i < 4; ++i)

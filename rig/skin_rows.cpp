@@ -24,7 +24,8 @@ class BlendedMultiquadrics {
       : mask_(mask), regions_(regionsOfInfluence(mask, edits)), rbf_(kMaskTriangleCount), side_(kMaskTriangleCount) {
     parallelFor(kMaskTriangleCount, [&](std::size_t t) {
       const auto stiffness = edits.stiffness.find(static_cast<std::uint8_t>(t));
-      rbf_[t] = Multiquadric(mask.points, regions_.points[t], stiffness == edits.stiffness.end() ? 1 : stiffness->second);
+      rbf_[t] =
+          Multiquadric(mask.points, regions_.points[t], stiffness == edits.stiffness.end() ? 1 : stiffness->second);
       side_[t] = slitSideOfTriangle(t);
     });
   }
@@ -87,12 +88,12 @@ MaskOnSkin controlMaskOnSkin(const SkinProblem& problem, MaskGeometry geometry) 
 struct SkinInterpolation::State {
   const SkinProblem& problem;
   const MaskOnSkin& mask;
-  std::vector<std::int32_t> unknown;      // #V
-  std::vector<std::uint32_t> vertex;      // of each unknown
-  SparseRows blended;                     // step 1, per unknown; empty where there is no ray
+  std::vector<std::int32_t> unknown;  // #V
+  std::vector<std::uint32_t> vertex;  // of each unknown
+  SparseRows blended;                 // step 1, per unknown; empty where there is no ray
   std::unique_ptr<SkinEquations> equations;
 
-  std::vector<double> fade;               // step 4, per unknown
+  std::vector<double> fade;  // step 4, per unknown
 
   std::array<std::vector<float>, 7> to_opposite;  // step 3, per vertex
 
@@ -120,7 +121,8 @@ SkinInterpolation::SkinInterpolation(const SkinProblem& problem, const MaskOnSki
     if (triangle < 0) continue;
     double size = 0;
     for (std::size_t k = 0; k < 3; ++k)
-      size += mask.barycentric[s.vertex[i]][k] * edge_length[mask.geometry.triangles[static_cast<std::size_t>(triangle)][k]];
+      size += mask.barycentric[s.vertex[i]][k] *
+              edge_length[mask.geometry.triangles[static_cast<std::size_t>(triangle)][k]];
     const double width = std::max(problem.blend_width, 1e-3) * size / problem.eye_separation;
     // The two terms balance at this wavelength: (2 pi / width)^4.
     data_weight[i] = std::pow(2 * 3.14159265358979 / width, 4);
@@ -128,9 +130,8 @@ SkinInterpolation::SkinInterpolation(const SkinProblem& problem, const MaskOnSki
   // The factorisation, which takes longest and is one thread's work, beside all that does not need it.
   parallelFor(2, [&](std::size_t which) {
     if (which == 0) {
-      s.equations =
-          std::make_unique<SkinEquations>(problem.skin, s.unknown, data_weight, mask.points, problem.lining,
-                                          problem.eye_separation);
+      s.equations = std::make_unique<SkinEquations>(problem.skin, s.unknown, data_weight, mask.points, problem.lining,
+                                                    problem.eye_separation);
     } else {
       s.blend();
       s.makeFade();
@@ -171,6 +172,13 @@ void SkinInterpolation::State::makeFade() {
   std::vector<GeodesicSource> still;
   for (std::uint32_t v = 0; v < unknown.size(); ++v)
     if (problem.skin.stands(v) && unknown[v] < 0) still.push_back({v, 0.0F});
+  // Rest begins somewhere along the edges to such vertices.
+  const EdgeGraph& graph = problem.skin.graph;
+  for (const std::uint32_t v : vertex)
+    for (std::uint32_t e = graph.start[v]; e < graph.start[v + 1]; ++e)
+      if (unknown[graph.neighbour[e]] < 0)
+        still.push_back(
+            {v, std::clamp(problem.association.fade_out - problem.association.beyond[v], 0.0F, graph.length[e])});
   const std::vector<float> to_still = surfaceDistances(problem.skin.graph, still).distance;
   fade.reserve(vertex.size());
   for (const std::uint32_t v : vertex) {
@@ -181,7 +189,8 @@ void SkinInterpolation::State::makeFade() {
   for (const SkinTie& tie : problem.lining) {
     double front = 0;
     for (std::size_t k = 0; k < 3; ++k)
-      if (const std::int32_t u = unknown[tie.to[k]]; u >= 0) front += tie.weight[k] * alone[static_cast<std::size_t>(u)];
+      if (const std::int32_t u = unknown[tie.to[k]]; u >= 0)
+        front += tie.weight[k] * alone[static_cast<std::size_t>(u)];
     double& own = fade[static_cast<std::size_t>(unknown[tie.vertex])];
     own += tie.share * (front - own);
   }
@@ -212,8 +221,8 @@ Columns SkinInterpolation::displace(const Columns& points) const {
   return out;
 }
 
-// From the skin that the mask itself covers: what only lies near to it (the inside of the mouth) has no side of its own,
-// or its two halves would part at a line that depends on how the mesh is cut.
+// From the skin that the mask itself covers: what only lies near to it (the inside of the mouth) has no side of its
+// own, or its two halves would part at a line that depends on how the mesh is cut.
 std::array<std::vector<float>, 7> SkinInterpolation::State::toOppositeSide() const {
   std::array<std::vector<float>, 7> out;
   // Where the opposite side is farther than a point, the point has its full weight (step 3).
@@ -227,6 +236,8 @@ std::array<std::vector<float>, 7> SkinInterpolation::State::toOppositeSide() con
     for (std::uint32_t v = 0; v < problem.skin.same_as.size(); ++v)
       if (problem.skin.stands(v) && problem.association.on_mask[v] && opposite(problem.association.side[v], side))
         others.push_back({v, 0.0F});
+    for (const SkinBorder& border : problem.association.borders)
+      if (opposite(problem.association.side[border.inside], side)) others.push_back({border.outside, border.left()});
     for (std::size_t p = 0; p < kFeaturePointCount; ++p)
       if (opposite(slitSide(p), side))
         others.insert(others.end(), problem.feature_points[p].around.begin(), problem.feature_points[p].around.end());
@@ -271,8 +282,8 @@ SkinRows SkinInterpolation::rows() const {
       for (std::size_t p = first; p < last; ++p) {
         double w = x(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(p - first));
         if (!(std::abs(w) > kNegligible)) continue;
-        // Step 3: a column of one side is led to zero towards the opposite side, from the full weight where the column's
-        // own point is as near as the opposite side, to nothing there.
+        // Step 3: a column of one side is led to zero towards the opposite side, from the full weight where the
+        // column's own point is as near as the opposite side, to nothing there.
         const auto& others = s.to_opposite[static_cast<std::size_t>(s.mask.geometry.point_side[p])];
         if (!others.empty() && others[s.vertex[i]] < kUnreached) {
           const double other = others[s.vertex[i]];
@@ -326,7 +337,8 @@ SkinRows SkinInterpolation::rows() const {
       if (out.moves(end)) row.addRow(out.rows, static_cast<std::size_t>(out.row_of_vertex[end]), share);
     out.set(t.vertex, row);
   }
-  for (std::uint32_t v = 0; v < s.unknown.size(); ++v) out.row_of_vertex[v] = out.row_of_vertex[s.problem.skin.same_as[v]];
+  for (std::uint32_t v = 0; v < s.unknown.size(); ++v)
+    out.row_of_vertex[v] = out.row_of_vertex[s.problem.skin.same_as[v]];
   return out;
 }
 

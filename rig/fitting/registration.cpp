@@ -95,8 +95,11 @@ class Sticker {
     for (std::uint32_t v = 0; v < skin.same_as.size(); ++v) {
       double sum = 0;
       for (std::uint32_t e = skin.graph.start[v]; e < skin.graph.start[v + 1]; ++e) {
-        entries.emplace_back(v, skin.graph.neighbour[e], skin.laplacian[e]);
-        sum += skin.laplacian[e];
+        // Between bounds, so that no vertex is pushed beyond its neighbours: it is the generic head that bends here,
+        // always the same mesh.
+        const double weight = std::clamp(skin.laplacian[e], 0.02, 20.0);
+        entries.emplace_back(v, skin.graph.neighbour[e], weight);
+        sum += weight;
       }
       entries.emplace_back(v, v, -sum);
       // On the boundary the Laplacian looks to one side only.
