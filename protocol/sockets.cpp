@@ -3,6 +3,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <pthread.h>
 #include <sched.h>
 #include <sys/stat.h>
 
@@ -11,8 +12,13 @@ namespace volto::protocol {
 Context::Context() : context_(zmq_ctx_new()) {
   if (context_ == nullptr)
     throw SetupError(SetupError::Kind::failed, std::string("ZeroMQ cannot start: ") + zmq_strerror(zmq_errno()));
-  // ZeroMQ's own thread, woken by what is sent, does not take the processor from the one that is sending.
-  zmq_ctx_set(context_, ZMQ_THREAD_SCHED_POLICY, SCHED_BATCH);
+  // ZeroMQ's own thread, woken by what is sent, does not take the processor from the one that is sending. It aborts
+  // where it may not have what it was told to: tried here first. A real-time program's threads stay real-time.
+  const sched_param none{};
+  if (sched_getscheduler(0) == SCHED_OTHER && pthread_setschedparam(pthread_self(), SCHED_BATCH, &none) == 0) {
+    pthread_setschedparam(pthread_self(), SCHED_OTHER, &none);
+    zmq_ctx_set(context_, ZMQ_THREAD_SCHED_POLICY, SCHED_BATCH);
+  }
 }
 
 Socket::Socket(const Context& context, int type) : socket_(zmq_socket(context.get(), type)) {
