@@ -92,9 +92,9 @@ void placePoints(const Mesh& mesh, const FeaturePointChoices& choices, Rig& rig)
     }
 }
 
-// One row of the operator and one row of the sparse system for each vertex around the face: 250 000 take about a minute
-// and two gigabytes.
-constexpr std::size_t kMaxMovingVertices = 250'000;
+// One row of the operator and one row of the sparse system for each vertex around the face: a million take some four
+// minutes of processor time and five gigabytes.
+constexpr std::size_t kMaxMovingVertices = 1'000'000;
 
 // Before anything is done: how many vertices could move at most.
 void requireSolvable(const Mesh& mesh, const FeaturePointPositions& points, double fade_out) {

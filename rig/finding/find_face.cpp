@@ -4,17 +4,22 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 #include <string_view>
 
 #include <Eigen/Geometry>
 
 #include "rig/finding/face_search.h"
 #include "rig/finding/winding.h"
+#include "rig/head_frame.h"
 
 namespace volto::rig {
 namespace {
 
 constexpr std::size_t kSamples = 8000;
+// A ball that holds a head, in its own frame.
+const Eigen::Vector3d kHeadCentre(0, -0.2, -1);
+constexpr double kHeadRadius = 2.6;
 
 // Those that a face's relief shows well; the corners of the eyes first. `shift`: the relief carries the generic head's
 // point to one place and people mark another, so much farther to the left (mirrored on the right side) and up, in eye
@@ -61,10 +66,20 @@ void checkMesh(const Mesh& mesh, const FindOptions& options) {
 std::vector<SurfaceSample> besides(const std::vector<SurfaceSample>& samples, const FaceFrame& frame) {
   std::vector<SurfaceSample> rest;
   for (const SurfaceSample& s : samples)
-    if (frame.toHead(s.position).norm() > 0 && (frame.toHead(s.position) - Eigen::Vector3d(0, -0.2, -1)).norm() > 2.6)
+    if (frame.toHead(s.position).norm() > 0 && (frame.toHead(s.position) - kHeadCentre).norm() > kHeadRadius)
       rest.push_back(s);
   if (rest.size() < samples.size() / 6) rest.clear();
   return rest;
+}
+
+// How far away another face is, in this one's eye separations.
+std::optional<double> faceBeside(const NormalisedSurface& surface, const std::vector<SurfaceSample>& samples,
+                                 const FaceFrame& face) {
+  const std::vector<SurfaceSample> rest = besides(samples, face);
+  if (rest.empty()) return std::nullopt;
+  const SearchResult other = searchFace(surface, rest, false);
+  if (other.best.likeness < kFaceLikeness) return std::nullopt;
+  return (other.best.frame.origin - face.origin).norm() / face.size;
 }
 
 // Behind a socket without its eyeball the relief is deep: a landmark that comes out far behind where the others have it
@@ -104,6 +119,20 @@ std::vector<RoughLandmark> landmarksOf(const FaceMatch& match, const NormalisedS
 
 }  // namespace
 
+std::optional<double> findAnotherFace(const Mesh& mesh, const FeaturePointPositions& points) {
+  checkMesh(mesh, {});
+  const NormalisedSurface surface = normaliseSurface(mesh);
+  const auto at = [&](std::string_view id) -> Eigen::Vector3d {
+    return (points.row(static_cast<Eigen::Index>(*featurePointIndex(id))).transpose() - surface.centre) / surface.size;
+  };
+  const Eigen::Vector3d left = (at("3.7") + at("3.11")) / 2, right = (at("3.8") + at("3.12")) / 2;
+  const FaceFrame face{meshFromHead(points), (left + right) / 2, (left - right).norm()};
+  // What is nowhere far from the face needs no looking at.
+  const Eigen::RowVector3d centre = face.toMesh(kHeadCentre).transpose();
+  if ((surface.positions.rowwise() - centre).rowwise().norm().maxCoeff() < kHeadRadius * face.size) return std::nullopt;
+  return faceBeside(surface, sampleVisibleSurface(surface, kSamples), face);
+}
+
 FoundFace findFace(const Mesh& mesh, const FindOptions& options) {
   checkMesh(mesh, options);
   const NormalisedSurface surface = normaliseSurface(mesh);
@@ -123,13 +152,9 @@ FoundFace findFace(const Mesh& mesh, const FindOptions& options) {
                      " ways to lie on them, and found no eyes, nose and mouth (likeness " +
                      number(std::max(0.0, best.likeness), "%.2f") + ", a face has " + number(kFaceLikeness, "%.1f") +
                      " or more); if this is a head, give landmarks");
-  if (const std::vector<SurfaceSample> rest = besides(samples, best.frame); !rest.empty()) {
-    const SearchResult other = searchFace(surface, rest, false);
-    if (other.best.likeness > kFaceLikeness)
-      throw InputError("looked for one face and found two, " +
-                       number((other.best.frame.origin - best.frame.origin).norm() / best.frame.size, "%.1f") +
-                       " eye separations apart; keep one head in the file");
-  }
+  if (const std::optional<double> apart = faceBeside(surface, samples, best.frame))
+    throw InputError("looked for one face and found two, " + number(*apart, "%.1f") +
+                     " eye separations apart; keep one head in the file");
 
   found.mesh_from_head = best.frame.mesh_from_head;
   found.landmarks = landmarksOf(best, surface, found.confidence);

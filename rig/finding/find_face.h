@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -11,6 +12,7 @@
 #include <Eigen/Core>
 
 #include "rig/errors.h"
+#include "rig/feature_points.h"
 #include "rig/mesh.h"
 
 namespace volto::rig {
@@ -54,6 +56,11 @@ struct FoundFace {
 // Throws InputError with what was looked for and not found: an empty or flat mesh, too many vertices, no plane of
 // symmetry, no face, two faces.
 FoundFace findFace(const Mesh& mesh, const FindOptions& options = {});
+
+// Whether the mesh holds another face than the one that these points are on: how far away it is, in this one's eye
+// separations. Looked for where at least a sixth of the surface is farther away than a head reaches; costs what findFace
+// costs then, and next to nothing else. `points`: all 84, mesh frame.
+std::optional<double> findAnotherFace(const Mesh& mesh, const FeaturePointPositions& points);
 
 // Turns the corner order of these polygons round (texture coordinates with them), first corner kept.
 void reversePolygons(Mesh& mesh, std::span<const std::uint32_t> polygons);

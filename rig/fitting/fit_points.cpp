@@ -451,7 +451,11 @@ FittedPoints fitPoints(const Mesh& mesh, const FeaturePointChoices& given, std::
     }
     out.points.emplace(p, choiceFor(p, target, hit, frame, vertex_taken));
     const double deviation = 0.75 * warp.deviation(human.points.row(static_cast<Eigen::Index>(p)));
-    const double error2 = std::pow(human.spread[p], 2) + deviation * deviation + hit.distance * hit.distance;
+    const bool neighbour_given = std::any_of(given.begin(), given.end(), [p](const auto& g) {
+      return featurePoints()[g.first].region == featurePoints()[p].region;
+    });
+    const double spread = neighbour_given ? human.spread[p] : std::max(human.spread[p], human.spread_unseen[p]);
+    const double error2 = spread * spread + deviation * deviation + hit.distance * hit.distance;
     out.confidence[p] = 1 / (1 + error2 / (kHalfConfidence_es * kHalfConfidence_es));
     if (out.confidence[p] < kDoubtful) out.to_check.push_back(p);
   }

@@ -1,5 +1,6 @@
 #include "rig/fitting/human_face.h"
 
+#include <algorithm>
 #include <array>
 
 namespace volto::rig {
@@ -8,6 +9,7 @@ namespace {
 struct HalfPoint {
   std::string_view id;
   double x, y, z, spread;
+  double spread_unseen = 0;  // where it is larger
 };
 
 // clang-format off
@@ -28,8 +30,8 @@ constexpr std::array kHalf = {
     HalfPoint{"3.11", 0.296, -0.015, 0.028, 0.033},
     HalfPoint{"3.13", 0.505, 0.152, 0.115, 0.040},
     HalfPoint{"4.1", 0.148, 0.375, 0.269, 0.051},
-    HalfPoint{"4.3", 0.646, 0.451, 0.103, 0.050},
-    HalfPoint{"4.5", 0.918, 0.228, -0.196, 0.050},
+    HalfPoint{"4.3", 0.646, 0.451, 0.103, 0.050, 0.146},
+    HalfPoint{"4.5", 0.918, 0.228, -0.196, 0.050, 0.122},
     HalfPoint{"5.1", 0.600, -0.583, 0.107, 0.034},
     HalfPoint{"5.3", 0.697, -0.215, 0.018, 0.015},
     HalfPoint{"8.1", 0.000, -0.967, 0.435, 0.039},
@@ -50,7 +52,7 @@ constexpr std::array kHalf = {
     HalfPoint{"11.1", 0.000, 1.098, 0.019, 0.080},
     HalfPoint{"11.3", 0.635, 0.942, -0.104, 0.030},
     HalfPoint{"12.1", 0.395, 0.443, 0.234, 0.016},
-    HalfPoint{"12.2", 0.792, 0.398, -0.018, 0.024},
+    HalfPoint{"12.2", 0.792, 0.398, -0.018, 0.024, 0.070},
     HalfPoint{"12.5", 0.431, 0.077, 0.083, 0.027},
     HalfPoint{"12.6", 0.609, 0.073, 0.062, 0.015},
     HalfPoint{"12.7", 0.439, -0.035, 0.064, 0.034},
@@ -75,6 +77,7 @@ const HumanFace& humanFace() {
       out.points.row(static_cast<Eigen::Index>(i)) << p.x, p.y, p.z;
       if (mirror != i) out.points.row(static_cast<Eigen::Index>(mirror)) << -p.x, p.y, p.z;
       out.spread[i] = out.spread[mirror] = p.spread;
+      out.spread_unseen[i] = out.spread_unseen[mirror] = std::max(p.spread, p.spread_unseen);
     }
     return out;
   }();

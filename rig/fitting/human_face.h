@@ -11,6 +11,8 @@ struct HumanFace {
   FeaturePointPositions points;  // head frame, unit: the eye separation, origin between the eyes; mirror symmetric
   // How far a point lies from where the others say, person to person and annotator to annotator, in eye separations.
   std::array<double, kFeaturePointCount> spread{};
+  // The same where no point of its region is given: nothing on the surface says where a brow is.
+  std::array<double, kFeaturePointCount> spread_unseen{};
 };
 
 // Measured: the mean of two libraries of heads (ICT-FaceKit, MakeHuman) with equal weight, annotated by hand, after a

@@ -263,6 +263,24 @@ TEST(Finding, RefusesTwoHeads) {
   EXPECT_NE(refusalOf(two).find("found two"), std::string::npos) << refusalOf(two);
 }
 
+TEST(Finding, AnotherFaceThanTheOneThatPointsAreOnIsNoticed) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "SKIPPED: the same code as in ShippedHead and Cube, which run under sanitizers too";
+#endif
+  FeaturePointPositions points;
+  for (std::size_t p = 0; p < kFeaturePointCount; ++p)
+    points.row(static_cast<Eigen::Index>(p)) = adult().at(featurePoints()[p].id).transpose();
+  EXPECT_FALSE(findAnotherFace(adult().mesh, points).has_value());
+  const Mesh two =
+      test::together({adult().mesh, test::moved(adult().mesh, Eigen::Matrix3d::Identity(), 1, {25, 0, 0})});
+  const std::optional<double> apart = findAnotherFace(two, points);
+  ASSERT_TRUE(apart.has_value());
+  EXPECT_NEAR(*apart, 25 / adult().eyeSeparation(), 0.5);
+  const Mesh with_body = test::together(
+      {adult().mesh, test::moved(test::headlessBody(), Eigen::Matrix3d::Identity(), 10, {0, -30, 0})});
+  EXPECT_FALSE(findAnotherFace(with_body, points).has_value());
+}
+
 TEST(Finding, SaysItsLimitBeforeItStarts) {
   const std::string refusal = refusalOf(adult().mesh, {.max_vertices = 1000, .min_confidence = 0});
   EXPECT_NE(refusal.find("up to 1000"), std::string::npos) << refusal;
