@@ -7,16 +7,18 @@
 //
 // Before that, the jump of displacement across the borders of the mask's triangles (rig/rig_health.h) against that of
 // the paper's hard association, on the mesh and on one with every triangle cut in four: what a smooth field leaves on a
-// coarse mesh goes with the square of its edges, a jump stays. And that of the expressions themselves, which know nothing
-// of the mask: what the measure sees of the skin's own folds.
+// coarse mesh goes with the square of its edges, a jump stays. And that of the expressions themselves, which know
+// nothing of the mask: what the measure sees of the skin's own folds.
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
 #include <exception>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <sstream>
 #include <string>
@@ -96,7 +98,8 @@ Mesh finer(const Mesh& mesh) {
   out.polygon_start.push_back(0);
   for (const auto& [a, b, c] : triangulate(mesh)) {
     const std::uint32_t ab = middle(a, b), bc = middle(b, c), ca = middle(c, a);
-    for (const std::uint32_t corner : {a, ab, ca, b, bc, ab, c, ca, bc, ab, bc, ca}) out.corner_vertices.push_back(corner);
+    for (const std::uint32_t corner : {a, ab, ca, b, bc, ab, c, ca, bc, ab, bc, ca})
+      out.corner_vertices.push_back(corner);
     for (int i = 0; i < 4; ++i) out.polygon_start.push_back(out.polygon_start.back() + 3);
   }
   out.positions.resize(mesh.positions.rows() + static_cast<Eigen::Index>(added.size()), 3);
@@ -113,6 +116,24 @@ std::vector<std::int16_t> trianglesByRay(const Rig& rig) {
   return triangle;
 }
 
+// The mask's surface cut otherwise: by which corner of its triangle a vertex is nearest to. Half way between the
+// points, where no region ends: what a field shows there it shows everywhere.
+std::vector<std::int16_t> nearestPoints(const Rig& rig, const std::vector<std::int16_t>& triangle) {
+  std::vector<std::int16_t> out(triangle.size(), -1);
+  for (std::size_t v = 0; v < triangle.size(); ++v) {
+    if (triangle[v] < 0) continue;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const std::uint8_t p : maskTriangles()[static_cast<std::size_t>(triangle[v])]) {
+      const double distance =
+          (rig.feature_positions.row(p) - rig.neutral.positions.row(static_cast<Eigen::Index>(v))).norm();
+      if (distance >= nearest) continue;
+      nearest = distance;
+      out[v] = p;
+    }
+  }
+  return out;
+}
+
 // Jump of displacement where neighbours belong to different triangles of the mask, over all expressions: the rig's, and
 // that of the paper's hard association, where every vertex moves by its own triangle's RBF alone.
 void reportSmoothness(const Rig& rig) {
@@ -127,7 +148,8 @@ void reportSmoothness(const Rig& rig) {
     if (triangle[v] >= 0)
       rbf[static_cast<std::size_t>(triangle[v])].weightsAt(
           rig.neutral.positions.row(static_cast<Eigen::Index>(v)).transpose(), weights[v]);
-  double ours = 0, hard = 0;
+  const std::vector<std::int16_t> cells = nearestPoints(rig, triangle);
+  double ours = 0, hard = 0, elsewhere = 0;
   int shapes = 0;
   for (const Blendshape& shape : rig.blendshapes) {
     if (!shape.moves_mask) continue;
@@ -147,17 +169,29 @@ void reportSmoothness(const Rig& rig) {
     }
     ours += borderJump(rig.neutral, triangle, blended).relative();
     hard += borderJump(rig.neutral, triangle, own).relative();
+    elsewhere += borderJump(rig.neutral, cells, blended).relative();
     ++shapes;
   }
   std::printf(
-      "%zu vertices: jump across borders relative to the displacement there: %.5f; hard association: %.5f; ratio %.1f\n",
+      "%zu vertices: jump across borders relative to the displacement there: %.5f; hard association: %.5f; ratio "
+      "%.1f\n",
       rig.neutral.vertexCount(), ours / shapes, hard / shapes, hard / ours);
+  // Curvature over an edge and a jump add up as squares.
+  const auto added = [&](double at_borders) {
+    return std::sqrt(std::max(at_borders * at_borders - elsewhere * elsewhere, 0.0)) / shapes;
+  };
+  std::printf(
+      "%zu vertices: the same where no region ends, half way between points: %.5f; borders add %.5f; hard "
+      "association's "
+      "%.5f; ratio %.1f\n",
+      rig.neutral.vertexCount(), elsewhere / shapes, added(ours), added(hard), added(hard) / added(ours));
 }
 
 void reportOwnSmoothness(const Rig& rig, const Examples& examples) {
   const std::vector<std::int16_t> triangle = trianglesByRay(rig);
   double sum = 0;
-  for (const VertexPositions& truth : examples.displacements) sum += borderJump(rig.neutral, triangle, truth).relative();
+  for (const VertexPositions& truth : examples.displacements)
+    sum += borderJump(rig.neutral, triangle, truth).relative();
   std::printf("%zu vertices: the same of the expressions themselves: %.5f\n", rig.neutral.vertexCount(),
               sum / static_cast<double>(examples.displacements.size()));
 }
