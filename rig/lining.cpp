@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kThickestEs = 0.2;
 // Lips roll over their margin: the inside goes with the front only farther in. From no share to all of it.
-constexpr double kFreeEs = 0.12, kWithFrontEs = 0.4;
+constexpr double kFreeEs = 0.2, kWithFrontEs = 0.4;
 
 // Points at an opening of the skin: the margins of the lips and their corners, and the nostrils. What is nearest to them
 // and has no ray lies inside of it. Not the lids: what is behind them lies on the ball and goes with it (rig/contacts.h).
