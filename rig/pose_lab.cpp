@@ -19,7 +19,7 @@ constexpr int kSteps = 5;         // of a round
 constexpr float kLeaning = 0.4F;
 constexpr float kFoldCosine = 0.12F;  // a little before a triangle stands at right angles to where it was
 constexpr float kFolded = 0.02F;
-constexpr double kCostOfMoving = 2;  // a vertex by an eye separation, in folded triangles
+constexpr double kCostOfMoving = 1;  // a vertex by an eye separation, in folded triangles
 constexpr float kLeastArea = 0.01F;  // of what it was
 
 }  // namespace

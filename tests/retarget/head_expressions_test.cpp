@@ -77,7 +77,7 @@ TEST_P(HeadExpressions, NothingFoldsPassesOrGapes) {
   EXPECT_EQ(health.shapes.size(), 52U);
   EXPECT_EQ(health.combinations.size(), 12U);
   EXPECT_LT(health.blink_gap_es, 0.01);
-  EXPECT_LT(health.symmetry_es, 3e-4);  // rounding, grown by the rounds that relax folds
+  EXPECT_LT(health.symmetry_es, 1e-4);
   EXPECT_EQ(health.border_es, 0.0);
   const PoseHealth worst = health.worst();
   EXPECT_LT(worst.eyeball_depth_es, 0.005);
